@@ -1,0 +1,96 @@
+"""What an engine is to the rest of the project. An adapter translates; everything else lives outside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol, runtime_checkable
+
+from pendbench.scene import Scene
+from pendbench.trajectory import FloatArray
+
+
+class State(NamedTuple):
+    """theta (n,) rad and omega (n,) rad/s, absolute, float64; gap: the worst rod's relative error in length."""
+
+    theta: FloatArray
+    omega: FloatArray
+    gap: float = 0.0
+
+
+class Fault(NamedTuple):
+    """What went wrong: one of `trajectory.STATUSES`, and the reason in words."""
+
+    status: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A number a method can be given. `default` None: the engine chooses one for the scene, as `note` says."""
+
+    default: float | None
+    low: float
+    high: float
+    integer: bool = False
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way an engine advances time.
+
+    order: the order of convergence it claims. adaptive: it chooses its own steps and is built with dt None.
+ note: one line for the documentation.
+    """
+
+    order: int
+    adaptive: bool = False
+    settings: Mapping[str, Setting] = field(default_factory=dict)
+    note: str = ""
+
+
+@runtime_checkable
+class Simulation(Protocol):
+    """One run in the making, of a method with a fixed step."""
+
+    def advance(self, steps: int) -> None:
+        """Take `steps` steps. The only call that is timed."""
+
+    def state(self) -> State:
+        """The state now, as new arrays."""
+
+    def health(self) -> Fault | None:
+        """What went wrong so far, or None."""
+
+
+@runtime_checkable
+class AdaptiveSimulation(Protocol):
+    """One run in the making, of a method that chooses its steps."""
+
+    def advance_to(self, time: float) -> int:
+        """Advance to exactly `time` (s) and return how many steps that took. The only call that is timed."""
+
+    def state(self) -> State:
+        """The state now, as new arrays."""
+
+    def health(self) -> Fault | None:
+        """What went wrong so far, or None."""
+
+
+class Engine(Protocol):
+    """A program that can simulate scenes."""
+
+    name: str
+    methods: Mapping[str, Method]
+
+    def version(self) -> str:
+        """The version of the program behind the adapter."""
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Why this engine cannot simulate the scene, or None."""
+
+    def build(
+        self, scene: Scene, method: str, dt: float | None, **settings: float
+    ) -> Simulation | AdaptiveSimulation:
+        """A run at time 0 in the scene's start. Never timed. `settings` holds only settings the method declares."""
