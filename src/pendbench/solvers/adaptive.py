@@ -1,0 +1,123 @@
+"""The loop with error control, for embedded Runge-Kutta pairs."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pendbench.compiled import compiled
+from pendbench.solvers.explicit import stage_state
+from pendbench.solvers.problem import derivative
+from pendbench.solvers.tableaux import EmbeddedPair
+from pendbench.trajectory import FloatArray
+
+DONE, TOO_SMALL, TOO_MANY, NOT_FINITE = 0, 1, 2, 3
+
+_SAFETY = 0.9
+_GROW_AT_MOST = 5.0
+_SHRINK_AT_MOST = 0.2
+
+
+class Progress(NamedTuple):
+    """How an integration ended: DONE or why not, the time reached, the next step (s), steps accepted and rejected."""
+
+    outcome: int
+    t: float
+    h: float
+    accepted: int
+    rejected: int
+
+
+@compiled
+def _scaled_error(method: EmbeddedPair, h: float, k: FloatArray, scale: FloatArray) -> float:
+    """The largest component of the two error estimates, combined as in Hairer's DOP853, over what is allowed."""
+    worst5, worst3 = 0.0, 0.0
+    for i in range(len(scale)):
+        e5, e3 = 0.0, 0.0
+        for s in range(len(method.b)):
+            e5 += method.error5[s] * k[s, i]
+            e3 += method.error3[s] * k[s, i]
+        worst5 = max(worst5, abs(e5 / scale[i]))
+        worst3 = max(worst3, abs(e3 / scale[i]))
+        if not (np.isfinite(e5) and np.isfinite(e3)):
+            return np.inf
+    if worst5 == 0.0:
+        return 0.0
+    return abs(h) * worst5 * worst5 / np.hypot(worst5, 0.1 * worst3)
+
+
+@compiled
+def _add(y: FloatArray, carry: FloatArray, change: FloatArray) -> None:
+    """Add `change` to y with the rounding errors kept in `carry` (compensated summation, Kahan 1965)."""
+    for i in range(len(y)):
+        small = change[i] + carry[i]
+        total = y[i] + small
+        carry[i] = small - (total - y[i])
+        y[i] = total
+
+
+@compiled
+def integrate(
+    system: Any,
+    method: EmbeddedPair,
+    t: float,
+    end: float,
+    h: float,
+    y: FloatArray,
+    carry: FloatArray,
+    tolerance: float,
+    relative: FloatArray,
+    smallest: float,
+    most_steps: int,
+) -> Progress:
+    """Advance y (d,), in place, from time t to exactly `end` with steps that keep the local error allowed.
+
+    h: the first step to try (s). carry (d,): what rounding left out of y, kept between calls. relative (d,): the error
+    allowed in y[i] is `tolerance (1 + relative[i] |y[i]|)`. Gives up at a step below `smallest` (s), after `most_steps`
+    accepted or rejected, or at a state that is not finite.
+
+    Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.4 (step control) and II.10.
+    """
+    stages, d = len(method.b), len(y)
+    k = np.empty((stages, d))
+    inner, scale, change = np.empty(d), np.empty(d), np.empty(d)
+    accepted, rejected = 0, 0
+    grow = _GROW_AT_MOST
+    while t < end:
+        if accepted + rejected >= most_steps:
+            return Progress(TOO_MANY, t, h, accepted, rejected)
+        left = end - t
+        last = h >= left
+        step = left if last else (0.5 * left if h > 0.5 * left else h)
+        for i in range(d):
+            scale[i] = tolerance * (1.0 + relative[i] * abs(y[i]))
+        for s in range(stages):
+            stage_state(method.a, s, step, y, k, inner)
+            derivative(system, t + method.c[s] * step, inner, k[s])
+        if not np.all(np.isfinite(k[0])):
+            return Progress(NOT_FINITE, t, h, accepted, rejected)
+        error = _scaled_error(method, step, k, scale)
+        factor = _SHRINK_AT_MOST
+        if error == 0.0:
+            factor = _GROW_AT_MOST
+        elif np.isfinite(error):
+            factor = min(_GROW_AT_MOST, max(_SHRINK_AT_MOST, _SAFETY * error ** (-1.0 / method.order)))
+        if error <= 1.0:
+            change[:] = 0.0
+            for s in range(stages):
+                for i in range(d):
+                    change[i] += step * method.b[s] * k[s, i]
+            _add(y, carry, change)
+            t = end if last else t + step
+            accepted += 1
+            # A step cut short to land on `end` says little about the next one.
+            h = max(h, step * min(factor, grow)) if last else step * min(factor, grow)
+            grow = _GROW_AT_MOST
+        else:
+            rejected += 1
+            grow = 1.0
+            h = step * min(factor, 1.0)
+            if h < smallest:
+                return Progress(TOO_SMALL, t, h, accepted, rejected)
+    return Progress(DONE, t, h, accepted, rejected)

@@ -1,0 +1,55 @@
+"""Loops with a fixed step: explicit Runge-Kutta methods and semi-implicit Euler."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pendbench.compiled import compiled
+from pendbench.solvers.problem import acceleration, derivative
+from pendbench.solvers.tableaux import Tableau
+from pendbench.trajectory import FloatArray
+
+
+@compiled
+def stage_state(a: FloatArray, row: int, h: float, y: FloatArray, k: FloatArray, out: FloatArray) -> None:
+    """Write `y + h sum_j a[row, j] k[j]` over the stages before `row` into `out`."""
+    out[:] = y
+    for j in range(row):
+        weight = h * a[row, j]
+        if weight != 0.0:
+            for i in range(len(y)):
+                out[i] += weight * k[j, i]
+
+
+@compiled
+def runge_kutta(system: Any, method: Tableau, t: float, dt: float, y: FloatArray, steps: int) -> None:
+    """Take `steps` steps of `dt` from time t, changing y (d,) in place."""
+    stages, d = len(method.b), len(y)
+    k = np.empty((stages, d))
+    inner = np.empty(d)
+    for step in range(steps):
+        start = t + step * dt
+        for s in range(stages):
+            stage_state(method.a, s, dt, y, k, inner)
+            derivative(system, start + method.c[s] * dt, inner, k[s])
+        for s in range(stages):
+            weight = dt * method.b[s]
+            for i in range(d):
+                y[i] += weight * k[s, i]
+
+
+@compiled
+def semi_implicit_euler(system: Any, t: float, dt: float, q: FloatArray, v: FloatArray, steps: int) -> None:
+    """Take `steps` steps of `dt` from time t: first the rates v (d,), then with them q (d,), both in place.
+
+    Symplectic for a Hamiltonian whose force does not depend on v; a chain's does, so here it is of order 1 and no more
+    (Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1.2).
+    """
+    a = np.empty_like(q)
+    for step in range(steps):
+        acceleration(system, t + step * dt, q, v, a)
+        for i in range(len(q)):
+            v[i] += dt * a[i]
+            q[i] += dt * v[i]

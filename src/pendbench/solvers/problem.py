@@ -1,0 +1,21 @@
+"""What a solver needs to know of the system it advances: nothing but its derivative.
+
+A system is a NamedTuple of arrays and numbers. Its module says what the functions below do for it
+(`compiled.specialises`), and numba compiles each solver once for each type of system, with the derivative inside.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pendbench.trajectory import FloatArray
+
+
+def derivative(system: Any, t: float, y: FloatArray, dy: FloatArray) -> None:
+    """Write dy/dt at time t (s) and state y (d,) into dy (d,)."""
+    raise NotImplementedError(f"no derivative for {type(system).__name__}")
+
+
+def acceleration(system: Any, t: float, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
+    """Write the second derivative of q (d,) at time t (s), with v (d,) its first, into a (d,)."""
+    raise NotImplementedError(f"no acceleration for {type(system).__name__}")
