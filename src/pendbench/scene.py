@@ -4,22 +4,80 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import os
 from dataclasses import dataclass
+from numbers import Real
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from pendbench.errors import InputError
+from pendbench.strict import input_error, show
+
 FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Range:
+    """The finite numbers from low to high, both included."""
+
+    low: float
+    high: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"a number from {self.low:g} to {self.high:g} {self.unit}"
+
+    def number(self, value: object) -> float:
+        """The value as a float. Raises `ValueError`, saying what is allowed, for anything but a number in the range."""
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise ValueError(str(self))
+        number: Any = value  # compared before it is converted: an integer can be too large for a float
+        if not self.low <= number <= self.high:
+            raise ValueError(str(self))
+        return float(number)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """A file's number is checked as one given in Python is: ``Annotated[float, Range(...)]`` in a table."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_plain_validator_function(self.number)
+
+
+# Far beyond any chain, and such that no product in the equations of motion overflows: the largest, of a mass ratio of
+# 1e100, a length ratio of 1e100 and a rate squared, stays below 1e308.
+MASS: Final = Range(1e-50, 1e50, "kg")
+LENGTH: Final = Range(1e-50, 1e50, "m")
+# Beyond 1e9 rad a sine has lost half of its digits.
+ANGLE: Final = Range(-1e9, 1e9, "rad")
+RATE: Final = Range(-1e9, 1e9, "rad/s")
+DURATION: Final = Range(1e-50, 1e9, "s")
+# Downwards: a chain in upward gravity is the same chain with pi added to its angles.
+GRAVITY: Final = Range(0.0, 1e9, "m/s^2")
+MAX_LINKS: Final = 1_000_000
 
 
 @dataclass(frozen=True)
 class Effects:
     """What acts on the chain. None: the scene does not call for it, and nothing of it is simulated.
 
+    This is the one place where an effect is declared: a field here is a key of the table [effects] of a scene file,
+    with the range given here. An effect of several numbers is a frozen dataclass of such fields, or a tuple, so that
+    effects can be compared and hashed.
+
     gravity: m/s^2, downwards.
     """
 
-    gravity: float | None = None
+    __pydantic_config__: ClassVar[Any] = {"extra": "forbid"}
+    KEYS_ARE: ClassVar[str] = "effect"
+
+    gravity: Annotated[float, GRAVITY] | None = None
+
+    def __post_init__(self) -> None:
+        if self.gravity is not None:
+            object.__setattr__(self, "gravity", _number("gravity", self.gravity, GRAVITY))
 
     def named(self) -> tuple[str, ...]:
         """The names of the effects that the scene calls for."""
@@ -31,7 +89,10 @@ class Scene:
     """A chain of n point masses on massless rods, and what happens to it.
 
     masses (n,) kg and lengths (n,) m from the pivot outwards; angles (n,) rad, absolute, from the downward vertical,
-    counter-clockwise positive; rates (n,) rad/s; duration s. The arrays are read-only.
+    counter-clockwise positive; rates (n,) rad/s; duration s. The arrays are copied, and read-only.
+
+    Raises `InputError`, one line, for arrays that are not (n,) with 1 <= n <= `MAX_LINKS`, and for numbers outside
+    `MASS`, `LENGTH`, `ANGLE`, `RATE` and `DURATION`.
     """
 
     name: str
@@ -44,10 +105,27 @@ class Scene:
     effects: Effects
 
     def __post_init__(self) -> None:
-        for field in ("masses", "lengths", "angles", "rates"):
-            array = np.array(getattr(self, field), dtype=np.float64)
-            array.setflags(write=False)
-            object.__setattr__(self, field, array)
+        try:
+            self._check()
+        except InputError as error:
+            raise input_error(f"scene {show(self.name)}", str(error)) from None
+
+    def _check(self) -> None:
+        for field, kind in (("name", str), ("title", str), ("effects", Effects)):
+            if not isinstance(getattr(self, field), kind):
+                raise InputError(f"{field} is {show(getattr(self, field))}; allowed: {kind.__name__}")
+        object.__setattr__(self, "duration", _number("duration", self.duration, DURATION))
+        for field, allowed in (("masses", MASS), ("lengths", LENGTH), ("angles", ANGLE), ("rates", RATE)):
+            object.__setattr__(self, field, _vector(field, getattr(self, field), allowed))
+        if not 1 <= self.n <= MAX_LINKS:
+            raise InputError(f"masses has {self.n} entries; allowed: 1 to {MAX_LINKS}")
+        for field in ("lengths", "angles", "rates"):
+            if len(getattr(self, field)) != self.n:
+                raise InputError(disagreement("masses", self.n, field, len(getattr(self, field))))
+
+    def __reduce__(self) -> tuple[type[Scene], tuple[Any, ...]]:
+        """Pickled by what it was made from, so that its arrays are read-only in another process too."""
+        return Scene, tuple(getattr(self, field.name) for field in dataclasses.fields(self))
 
     @property
     def n(self) -> int:
@@ -61,7 +139,7 @@ class Scene:
 
     def with_start(self, angles: npt.ArrayLike, rates: npt.ArrayLike) -> Scene:
         """The same scene from another start: angles (n,) rad, rates (n,) rad/s."""
-        return dataclasses.replace(self, angles=np.asarray(angles), rates=np.asarray(rates))
+        return dataclasses.replace(self, angles=cast(FloatArray, angles), rates=cast(FloatArray, rates))
 
     @property
     def digest(self) -> str:
@@ -69,5 +147,51 @@ class Scene:
         content = hashlib.sha256()
         for array in (self.masses, self.lengths, self.angles, self.rates):
             content.update(array.tobytes())
-        content.update(repr((self.n, self.duration, self.effects)).encode())
+        effects = {name: getattr(self.effects, name) for name in self.effects.named()}
+        content.update(repr((self.n, self.duration, effects)).encode())
         return content.hexdigest()[:16]
+
+
+def load_scene(path_or_name: str | os.PathLike[str], *, relative_to: Path | None = None) -> Scene:
+    """The scene in a file, or the bundled scene of that name.
+
+    What ends in .toml or holds a path separator is a path; it is looked for in the folder `relative_to` first, where
+    one is given, and then in the working folder. Anything else is the name of a bundled scene.
+
+    Raises `InputError`, one line naming the file and the key, for whatever cannot be used.
+    """
+    from pendbench.scene_file import find_scene, read_scene  # loads pydantic, which importing a scene should not
+
+    return read_scene(find_scene(path_or_name, relative_to))
+
+
+def disagreement(key: str, count: int, other: str, other_count: int) -> str:
+    """Say that two keys (`n`, or lists with one entry for each link) disagree about how many links there are."""
+    return f"{_counted(key, count)} but {_counted(other, other_count)}; allowed: one entry for each link"
+
+
+def _counted(key: str, count: int) -> str:
+    return f"{key} is {count}" if key == "n" else f"{key} has {count} {'entry' if count == 1 else 'entries'}"
+
+
+def _number(name: str, value: object, allowed: Range) -> float:
+    try:
+        return allowed.number(value)
+    except ValueError as error:
+        raise InputError(f"{name} is {show(value)}; allowed: {error}") from None
+
+
+def _vector(name: str, values: npt.ArrayLike, allowed: Range) -> FloatArray:
+    """The values as a read-only array (n,) of its own."""
+    try:
+        array = np.asarray(values)
+    except (ValueError, TypeError):
+        array = np.asarray(None)
+    if array.ndim != 1 or array.dtype.kind not in "iuf":
+        raise InputError(f"{name} is not a list of numbers; allowed: one number for each link")
+    outside = np.flatnonzero(~((array >= allowed.low) & (array <= allowed.high)))
+    if outside.size:
+        raise InputError(f"{name}, entry {outside[0] + 1}, is {show(array[outside[0]].item())}; allowed: {allowed}")
+    array = np.array(array, dtype=np.float64)
+    array.setflags(write=False)
+    return array

@@ -49,6 +49,11 @@ class Method:
     settings: Mapping[str, Setting] = field(default_factory=dict)
     note: str = ""
 
+    def with_defaults(self, given: Mapping[str, float]) -> dict[str, float]:
+        """The settings `given`, and the defaults of those that are not; one without either is left out."""
+        defaults = {name: s.default for name, s in self.settings.items() if s.default is not None}
+        return {**defaults, **given}
+
 
 @runtime_checkable
 class Simulation(Protocol):

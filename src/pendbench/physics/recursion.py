@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pendbench.compiled import compiled, specialises
-from pendbench.physics.system import System, system_of
+from pendbench.physics.system import System
 from pendbench.scene import Scene
 from pendbench.solvers import problem
 from pendbench.trajectory import FloatArray
@@ -90,6 +90,17 @@ def _derivative(system: Any, t: Any, y: Any, dy: Any) -> Callable[..., None] | N
         write_accelerations(system, y[:n], y[n:], dy[n:])
 
     return derivative
+
+
+def system_of(scene: Scene) -> System:
+    """The scene's chain and effects, ready for the kernels."""
+    gravity = scene.effects.gravity
+    return System(
+        masses=np.array(scene.masses),
+        lengths=np.array(scene.lengths),
+        gravity=0.0 if gravity is None else float(gravity),
+        scratch=np.empty((4, scene.n)),
+    )
 
 
 def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:

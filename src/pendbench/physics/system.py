@@ -7,13 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from pendbench.scene import Scene
 from pendbench.trajectory import FloatArray
-
-_SCRATCH_ROWS = 4
-
 
 class System(NamedTuple):
     """A chain under gravity or free of it.
@@ -26,14 +20,3 @@ class System(NamedTuple):
     lengths: FloatArray
     gravity: float
     scratch: FloatArray
-
-
-def system_of(scene: Scene) -> System:
-    """The scene's chain and effects, ready for the kernels."""
-    gravity = scene.effects.gravity
-    return System(
-        masses=np.array(scene.masses),
-        lengths=np.array(scene.lengths),
-        gravity=0.0 if gravity is None else float(gravity),
-        scratch=np.empty((_SCRATCH_ROWS, scene.n)),
-    )

@@ -14,6 +14,16 @@ from pendbench.trajectory import FloatArray
 
 DONE, TOO_SMALL, TOO_MANY, NOT_FINITE = 0, 1, 2, 3
 
+#: What each outcome but DONE is called: a status of `trajectory.STATUSES`, and the reason.
+REASONS = {
+    TOO_SMALL: ("work limit", "the step fell below the smallest allowed"),
+    TOO_MANY: ("work limit", "more steps than allowed"),
+    NOT_FINITE: ("not finite", "the derivative is not finite"),
+}
+
+#: A first step to try, s. Error control shrinks it where it is too large.
+FIRST_STEP = 1e-3
+
 _SAFETY = 0.9
 _GROW_AT_MOST = 5.0
 _SHRINK_AT_MOST = 0.2
@@ -90,6 +100,8 @@ def integrate(
         left = end - t
         last = h >= left
         step = left if last else (0.5 * left if h > 0.5 * left else h)
+        target = end if last else t + step
+        step = target - t  # what rounding makes of it, so that time does not slip
         for i in range(d):
             scale[i] = tolerance * (1.0 + relative[i] * abs(y[i]))
         for s in range(stages):
@@ -109,7 +121,7 @@ def integrate(
                 for i in range(d):
                     change[i] += step * method.b[s] * k[s, i]
             _add(y, carry, change)
-            t = end if last else t + step
+            t = target
             accepted += 1
             # A step cut short to land on `end` says little about the next one.
             h = max(h, step * min(factor, grow)) if last else step * min(factor, grow)

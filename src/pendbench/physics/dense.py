@@ -1,0 +1,53 @@
+"""The equations of motion as matrices: easy to read and to check, O(n^3) to solve.
+
+This is the statement of the note, with its misprints mended, and the oracle of the O(n) recursion. A solve of the
+dense system loses digits where masses differ by many decades (equations.md, "Why not solve the dense system").
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from pendbench.scene import FloatArray, Scene
+
+
+def hanging_masses(masses: FloatArray) -> FloatArray:
+    """M_k, the mass that hangs from rod k: (n,) kg from masses (n,) kg. equations.md (E2)."""
+    return np.cumsum(masses[::-1])[::-1]
+
+
+def mass_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
+    """C(theta), (n, n) kg m^2, symmetric and positive definite. theta: (n,) rad. equations.md (E7)."""
+    return _pair_inertias(scene) * np.cos(np.subtract.outer(theta, theta))
+
+
+def coupling_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
+    """S(theta), (n, n) kg m^2, antisymmetric: what the squared rates of the other rods do to rod i.
+
+    theta: (n,) rad. equations.md (E8); the note's (19) with its sign mended.
+    """
+    return _pair_inertias(scene) * -np.sin(np.subtract.outer(theta, theta))
+
+
+def gravity_torques(scene: Scene, theta: FloatArray) -> FloatArray:
+    """h(theta), (n,) N m; zero where the scene has no gravity. theta: (n,) rad. equations.md (E9)."""
+    if scene.effects.gravity is None:
+        return np.zeros(scene.n)
+    return scene.effects.gravity * hanging_masses(scene.masses) * scene.lengths * np.sin(theta)
+
+
+def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """Solve for theta'', (n,) rad/s^2: C theta'' = S omega^2 - h. theta: (n,) rad, omega: (n,) rad/s.
+
+    Raises scipy.linalg.LinAlgError where rounding has left C without its positive definiteness (masses that differ
+    by many decades). equations.md (E6); the note's (14).
+    """
+    torques = coupling_matrix(scene, theta) @ omega**2 - gravity_torques(scene, theta)
+    return np.asarray(cho_solve(cho_factor(mass_matrix(scene, theta)), torques))
+
+
+def _pair_inertias(scene: Scene) -> FloatArray:
+    """M_max(i,j) l_i l_j, (n, n). M never grows outwards, so M_max(i,j) is the smaller of M_i and M_j."""
+    hanging = hanging_masses(scene.masses)
+    return np.asarray(np.minimum.outer(hanging, hanging) * np.outer(scene.lengths, scene.lengths))

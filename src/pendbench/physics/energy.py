@@ -1,0 +1,85 @@
+"""Energy, angular momentum and tensions, from the positions and velocities of the masses.
+
+Never from an engine, and never from the matrices of the equations of motion: these are what they are checked with.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pendbench.physics import dense
+from pendbench.physics.geometry import positions, velocities
+from pendbench.scene import FloatArray, Scene
+
+
+def energy(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """Kinetic plus potential energy, (...,) J; the potential is zero at the pivot's height. equations.md (E3), (E4).
+
+    theta: (..., n) rad; omega: (..., n) rad/s.
+    """
+    return kinetic_energy(scene, theta, omega) + potential_energy(scene, theta)
+
+
+def kinetic_energy(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """The masses' kinetic energy, (...,) J: a sum of squares, so it never cancels. equations.md (E3)."""
+    speeds_squared = np.sum(velocities(scene.lengths, theta, omega) ** 2, axis=-1)
+    return np.asarray(0.5 * np.sum(scene.masses * speeds_squared, axis=-1))
+
+
+def potential_energy(scene: Scene, theta: FloatArray) -> FloatArray:
+    """The masses' weight times their height above the pivot, (...,) J; zero without gravity. equations.md (E4)."""
+    if scene.effects.gravity is None:
+        return np.zeros(np.shape(theta)[:-1])
+    heights = positions(scene.lengths, theta)[..., 1]
+    return np.asarray(scene.effects.gravity * np.sum(scene.masses * heights, axis=-1))
+
+
+def energy_scale(scene: Scene) -> float:
+    """What energy drift is measured against, J. equations.md (E21).
+
+    The full range of the potential, or the initial kinetic energy where that is larger. It is 0 for a chain at rest
+    without gravity: no energy is at stake there, and a relative drift has no meaning.
+    """
+    gravity = scene.effects.gravity or 0.0
+    potential_range = 2.0 * gravity * float(dense.hanging_masses(scene.masses) @ scene.lengths)
+    return max(potential_range, float(kinetic_energy(scene, scene.angles, scene.rates)))
+
+
+def angular_momentum(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """Angular momentum about the pivot, (...,) kg m^2/s, counter-clockwise positive. equations.md (E5).
+
+    theta: (..., n) rad; omega: (..., n) rad/s. Without gravity it is conserved.
+    """
+    place = positions(scene.lengths, theta)
+    speed = velocities(scene.lengths, theta, omega)
+    return np.asarray(np.sum(scene.masses * (place[..., 0] * speed[..., 1] - place[..., 1] * speed[..., 0]), axis=-1))
+
+
+def tensions(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """How hard each rod pulls, (n,) N; negative where it pushes. equations.md (E20).
+
+    theta: (n,) rad; omega: (n,) rad/s. From the dense accelerations; raises as `dense.accelerations` does.
+    """
+    along = np.stack([np.sin(theta), -np.cos(theta)], axis=-1)
+    return np.asarray(np.sum(along * rod_forces(scene, theta, omega), axis=-1))
+
+
+def rod_forces(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """The force that rod i passes inwards, (n, 2) N: Newton's second law for all the masses from i outwards, together.
+
+    theta: (n,) rad; omega: (n,) rad/s. A massless rod can pass force only along itself, so the part of it across the
+    rod is zero exactly when the accelerations are right. equations.md (E20).
+    """
+    below_free_fall = -_accelerations_against_free_fall(scene, theta, omega)
+    weighed = scene.masses[:, np.newaxis] * below_free_fall
+    return np.cumsum(weighed[::-1], axis=0)[::-1]
+
+
+def _accelerations_against_free_fall(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """a'_i = a_i + (0, g), (n, 2) m/s^2. equations.md (E11)."""
+    turning = scene.lengths * dense.accelerations(scene, theta, omega)
+    centripetal = scene.lengths * omega**2
+    sin, cos = np.sin(theta), np.cos(theta)
+    steps = np.stack([turning * cos - centripetal * sin, turning * sin + centripetal * cos], axis=-1)
+    gravity = scene.effects.gravity or 0.0
+    return np.asarray(np.cumsum(steps, axis=0) + np.array([0.0, gravity]))

@@ -1,0 +1,136 @@
+"""The truth for a scene, how well it is known, and until when.
+
+Two solves in double-double arithmetic that share neither formulation, nor order, nor steps: angles with the O(n)
+recursion at order 28, and unit vectors with tensions from a tridiagonal system at order 24. Where they agree, both are
+right; the time until which they do is the horizon.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pendbench.errors import InputError
+from pendbench.scene import Scene
+from pendbench.trajectory import FloatArray, Trajectory
+
+#: The reference ends where its two solves differ by more than this (in units of e: lengths of the chain).
+AGREEMENT = 1e-9
+
+# One extrapolated step carries about 1e-29 of rounding; a tolerance much nearer to that is met by no step.
+_TOLERANCE = 1e-27
+_COLUMNS = (14, 12)
+_FIRST_STEP = 1e-3
+_SMALLEST_STEP = 1e-12
+_MOST_STEPS = 1_000_000
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Truth(Trajectory):
+    """A trajectory that ends at its horizon.
+
+    horizon: s, the last sample at which the two solves agree. error: the largest disagreement up to there, in units of
+    the chain's total length. disagreement: (k,) the same at each sample. theta_low, omega_low: (k, n) what double
+    precision leaves out of theta and omega.
+    """
+
+    horizon: float
+    error: float
+    disagreement: FloatArray
+    theta_low: FloatArray
+    omega_low: FloatArray
+
+    def offset(self, theta: FloatArray) -> FloatArray:
+        """How far angles theta (j, n) at this trajectory's first j times are from the truth, rad, (j, n)."""
+        j = len(theta)
+        difference: FloatArray = (theta - self.theta[:j]) - self.theta_low[:j]
+        return difference
+
+
+class _Solve:
+    """One of the two solves: a system, its state, and how it advances."""
+
+    def __init__(self, system: Any, state: FloatArray, weights: FloatArray) -> None:
+        self.system, self.state, self.weights = system, state, weights
+        self.relative = np.ones(len(state))
+        self.h, self.steps = _FIRST_STEP, 0
+
+    def advance(self, t: float, end: float) -> bool:
+        """Advance from t to end; False where the solve cannot go on."""
+        from pendbench.solvers.adaptive import DONE
+        from pendbench.solvers.extrapolation import integrate_extended
+
+        progress = integrate_extended(
+            self.system,
+            self.weights,
+            t,
+            end,
+            self.h,
+            self.state,
+            _TOLERANCE,
+            self.relative,
+            _SMALLEST_STEP,
+            _MOST_STEPS - self.steps,
+        )
+        self.h, self.steps = progress.h, self.steps + progress.accepted + progress.rejected
+        return progress.outcome == DONE
+
+
+@cache
+def _weights(columns: int) -> FloatArray:
+    from pendbench.solvers.extrapolation import neville_weights
+
+    return neville_weights(columns)
+
+
+def _march(scene: Scene, times: FloatArray) -> Iterator[tuple[FloatArray, float]]:
+    """The angle form's state (2 n, 2) and its distance from the vector form's, at each time, as long as both go on."""
+    from pendbench.physics.extended import angle_form, form_difference, vector_form
+    from pendbench.physics.geometry import distance
+
+    angles = _Solve(*angle_form(scene), _weights(_COLUMNS[0]))
+    vectors = _Solve(*vector_form(scene), _weights(_COLUMNS[1]))
+    t = 0.0
+    for end in times:
+        if not (angles.advance(t, end) and vectors.advance(t, end)):
+            return
+        t = float(end)
+        difference = form_difference(angles.state, vectors.state)
+        yield angles.state.copy(), float(distance(scene.lengths, angles.state[: scene.n, 0], difference))
+
+
+def reference(scene: Scene, times: npt.ArrayLike | None = None) -> Truth:
+    """The truth for `scene` at `times` (k,) s, by default 1001 times over its duration, until its horizon.
+
+    Raises InputError where times are not finite, not rising, or negative. Source: docs/measuring.md.
+    """
+    wanted = np.linspace(0.0, scene.duration, 1001) if times is None else np.atleast_1d(np.asarray(times, float))
+    if not np.all(np.isfinite(wanted)) or wanted.ndim != 1 or np.any(np.diff(wanted) <= 0) or np.any(wanted < 0):
+        raise InputError("times: allowed are finite, rising numbers from 0 on")
+    states, gaps = [], []
+    for state, gap in _march(scene, wanted):
+        if not gap <= AGREEMENT:
+            break
+        states.append(state)
+        gaps.append(gap)
+    n, k = scene.n, len(states)
+    stacked = np.array(states).reshape(k, 2 * n, 2)
+    disagreement = np.array(gaps)
+    whole = k == len(wanted)
+    return Truth(
+        t=wanted[:k],
+        theta=stacked[:, :n, 0],
+        omega=stacked[:, n:, 0],
+        gap=np.zeros(k),
+        reason="" if whole else "ends at its horizon: past it the two solves no longer agree",
+        horizon=float(wanted[k - 1]) if k else 0.0,
+        error=np.float64(disagreement.max() if k else 0.0),
+        disagreement=disagreement,
+        theta_low=stacked[:, :n, 1],
+        omega_low=stacked[:, n:, 1],
+    )

@@ -1,0 +1,93 @@
+"""How long stepping takes. Nothing else is timed, one case at a time, and what the timings are worth is said."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation
+from pendbench.scene import Scene
+
+REPEATS = 5
+_SAMPLE_S = 0.01  # a sample shorter than this is mostly the clock's own noise
+
+
+class Timing(NamedTuple):
+    """step_us: the median cost of a step. spread: (largest - smallest) / median of the samples. steps: in one sample.
+
+    build_s: building the run. first_call_s: the first step of the first run, with what is compiled or loaded then.
+    run_s: stepping up to the time that was asked for (measured for an adaptive method, the steps' cost otherwise).
+    """
+
+    step_us: float
+    spread: float
+    steps: int
+    build_s: float
+    first_call_s: float
+    run_s: float
+
+
+def _fixed(engine: Engine, scene: Scene, method: str, dt: float, settings: dict[str, float], until: float) -> Timing:
+    def build() -> Simulation:
+        simulation = engine.build(scene, method, dt, **settings)
+        assert isinstance(simulation, Simulation)
+        return simulation
+
+    first = build()
+    first_call = _seconds(lambda: first.advance(1))
+    steps = _enough_steps(build())
+    samples, builds = [], []
+    for _ in range(REPEATS):
+        begun = time.perf_counter()
+        simulation = build()
+        builds.append(time.perf_counter() - begun)
+        simulation.advance(1)
+        samples.append(_seconds(lambda s=simulation: s.advance(steps)) / steps)  # type: ignore[misc]
+    median = float(np.median(samples))
+    spread = float(np.ptp(samples)) / median
+    return Timing(median * 1e6, spread, steps, float(np.median(builds)), first_call, median * round(until / dt))
+
+
+def _enough_steps(simulation: Simulation) -> int:
+    """How many steps fill a sample."""
+    simulation.advance(1)
+    steps = 8
+    while (taken := _seconds(lambda: simulation.advance(steps))) < _SAMPLE_S / 4 and steps < 1 << 24:
+        steps *= 2
+    return max(1, round(steps * _SAMPLE_S / max(taken, 1e-9)))
+
+
+def _adaptive(engine: Engine, scene: Scene, method: str, settings: dict[str, float], until: float) -> Timing:
+    samples, builds, firsts, steps = [], [], [], 1
+    for _ in range(REPEATS + 1):
+        begun = time.perf_counter()
+        simulation = engine.build(scene, method, None, **settings)
+        builds.append(time.perf_counter() - begun)
+        assert isinstance(simulation, AdaptiveSimulation)
+        begun = time.perf_counter()
+        simulation.advance_to(1e-6 * until)
+        firsts.append(time.perf_counter() - begun)
+        begun = time.perf_counter()
+        steps = max(1, simulation.advance_to(until))
+        samples.append(time.perf_counter() - begun)
+    samples = samples[1:]
+    median = float(np.median(samples))
+    spread = float(np.ptp(samples)) / median
+    return Timing(median / steps * 1e6, spread, steps, float(np.median(builds)), firsts[0], median)
+
+
+def _seconds(call: object) -> float:
+    begun = time.perf_counter()
+    call()  # type: ignore[operator]
+    return time.perf_counter() - begun
+
+
+def time_case(
+    engine: Engine, scene: Scene, method: str, dt: float | None, settings: dict[str, float], until: float
+) -> Timing:
+    """Time a method of an engine on a scene, `run_s` up to the time `until` (s)."""
+    if dt is None:
+        return _adaptive(engine, scene, method, settings, until)
+    return _fixed(engine, scene, method, dt, settings, until)

@@ -1,0 +1,84 @@
+"""Finished work on disk: one file for each piece, written whole or not at all, found again by what it depends on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from pendbench.trajectory import FloatArray
+
+
+@cache
+def source_digest() -> str:
+    """A hash of the project's own source: results of other code are not taken for results of this one."""
+    package = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def key_of(*parts: object) -> str:
+    """A name for what depends on `parts` (their repr) and on the project's source."""
+    return hashlib.sha256(repr((source_digest(), *parts)).encode()).hexdigest()[:24]
+
+
+def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file so that it is there whole or not at all, whenever the program stops."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+class Store:
+    """The folder of finished work of one study."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def _path(self, key: str, ending: str) -> Path:
+        return self.folder / f"{key}.{ending}"
+
+    def load(self, key: str) -> Any:
+        """What was saved under `key`, or None where there is nothing that can be read."""
+        try:
+            record = json.loads(self._path(key, "json").read_text("utf-8"))
+        except (OSError, ValueError):
+            return None
+        return record["value"] if isinstance(record, dict) and record.get("key") == key else None
+
+    def save(self, key: str, value: Any) -> None:
+        """Save a value of JSON's types; numbers may be nan or infinite."""
+        text = json.dumps({"key": key, "value": value}).encode()
+        write_whole(self._path(key, "json"), lambda file: file.write(text))
+
+    def load_arrays(self, key: str) -> dict[str, FloatArray] | None:
+        """The arrays that were saved under `key`, or None where there is nothing that can be read."""
+        try:
+            with np.load(self._path(key, "npz"), allow_pickle=False) as arrays:
+                return {name: arrays[name] for name in arrays.files}
+        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
+            return None
+
+    def save_arrays(self, key: str, arrays: dict[str, FloatArray]) -> None:
+        """Save arrays by name."""
+        write_whole(self._path(key, "npz"), lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
