@@ -144,6 +144,12 @@ def test_how_a_number_is_shown_that_python_will_not_print() -> None:
     assert strict.show(10**5000) == "a whole number of about 5001 digits"
 
 
+def test_a_message_is_bounded_and_on_one_line() -> None:
+    message = str(strict.input_error("file.toml", "\n" * 999))
+    assert len(message) == strict.MAX_LINE
+    assert message.isprintable()
+
+
 # --- validating ------------------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,28 @@
+"""The kinds of study. A kind is a module of this package; adding one is adding its name here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Protocol, cast
+
+if TYPE_CHECKING:
+    from pendbench.study.plan import Plan, StudyFile
+    from pendbench.study.results import Results
+    from pendbench.study.runner import Runner
+
+#: Names of kinds, each with its module.
+KINDS: Final = {"chaos": "pendbench.study.chaos"}
+
+
+class Kind(Protocol):
+    """What a kind's module offers."""
+
+    Options: type[StudyFile]
+    run: Callable[[Plan, Runner], Results]
+
+
+def kind(name: str) -> Kind:
+    """The module of a kind."""
+    module: Any = import_module(KINDS[name])
+    return cast(Kind, module)

@@ -1,0 +1,151 @@
+"""The jobs of studies: what runs in a worker process. Each returns a record of JSON's types."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from pendbench.engines.protocol import Fault
+from pendbench.engines.registry import engine
+from pendbench.physics.energy import energy, energy_scale
+from pendbench.physics.geometry import distance, wrapped
+from pendbench.reference import reference
+from pendbench.scene import Scene
+from pendbench.simulate import simulate
+from pendbench.study.case import Case
+from pendbench.study.causes import model_error
+from pendbench.study.clock import time_case
+from pendbench.study.lyapunov import lyapunov_exponent
+from pendbench.study.measure import drift, growth_rate, time_to
+from pendbench.study.store import Store
+from pendbench.trajectory import FloatArray, Trajectory
+
+Record = dict[str, Any]
+
+#: The errors e whose first passing counts as divergence.
+THRESHOLDS: Final = (1e-3, 1e-2, 1e-1)
+
+_CURVE_POINTS: Final = 250
+_GROWTH_FROM: Final = 1e-12
+_GROWTH_TO: Final = 1e-2
+
+
+def measure_truth(scene: Scene, times: FloatArray, store: Store, key: str) -> Record:
+    """Compute the truth at `times`, save its arrays under `key`, and say how good it is."""
+    truth = reference(scene, times)
+    names = ("t", "theta", "omega", "theta_low", "disagreement")
+    store.save_arrays(key, {name: getattr(truth, name) for name in names})
+    return {"horizon": truth.horizon, "error": float(truth.error), "status": truth.status, "reason": truth.reason}
+
+
+def measure_exponent(scene: Scene, seconds: float) -> Record:
+    """The scene's largest Lyapunov exponent."""
+    found = lyapunov_exponent(scene, seconds)
+    return {"rate": found.rate, "error": found.error, "chaotic": found.chaotic}
+
+
+def measure_model(case: Case, seed: int) -> Record:
+    """How far the engine's accelerations are from the equations'."""
+    return model_error(engine(case.engine), case.scene, case.method, dict(case.settings), seed)._asdict()
+
+
+def measure_timing(case: Case, until: float) -> Record:
+    """What the case costs."""
+    found = time_case(engine(case.engine), case.scene, case.method, case.dt, dict(case.settings), until)
+    return {
+        "step_us": found.step_us,
+        "step_spread": found.spread,
+        "simulated_s_per_s": until / found.run_s,
+        "build_s": found.build_s,
+        "first_call_s": found.first_call_s,
+        "run_s": found.run_s,
+    }
+
+
+def measure_run(
+    case: Case, start: Scene, times: FloatArray, truth_key: str, store: Store, order_time: float, curve: bool
+) -> Record:
+    """Run the case from `start` and compare it with the truth saved under `truth_key`."""
+    run = simulate(start, case.engine, case.method, case.dt, times, **dict(case.settings))
+    truth = store.load_arrays(truth_key)
+    if truth is None:
+        return failed_run(Fault("error", "no truth to compare with"))
+    at = np.searchsorted(truth["t"], times - 1e-9)
+    inside = at < len(truth["t"])
+    compared, at = times[inside], at[inside]
+    error, angle = _errors(start, run, truth, at)
+    record = _energies(start, run, compared[-1])
+    record |= _divergence(compared, error)
+    half = compared <= 0.5 * compared[-1]
+    upto = _largest(error[half[: len(error)]])
+    record |= {
+        "status": run.status,
+        "reason": run.reason,
+        "steps": run.steps,
+        "error_max": _largest(error),
+        "error_half": upto,
+        "reference_error_half": _largest(truth["disagreement"][at[half]]),
+        "angle_error_max_rad": _largest(angle),
+        "gap_max": _largest(run.gap),
+        "growth": growth_rate(compared[: len(error)], error, _GROWTH_FROM, _GROWTH_TO),
+        "order_error": _at(compared[: len(error)], error, order_time),
+    }
+    if curve:
+        record["curve"] = _curve(start, run, error)
+    return record
+
+
+def failed_run(fault: Fault) -> Record:
+    """The record of a run of which nothing came back."""
+    return {"status": fault.status, "reason": fault.reason, "order_error": None}
+
+
+def _errors(scene: Scene, run: Trajectory, truth: dict[str, FloatArray], at: Any) -> tuple[FloatArray, FloatArray]:
+    """e and the largest wrapped angle error at each compared time that the run reached."""
+    at = at[: len(run.t)]
+    offset = (run.theta[: len(at)] - truth["theta"][at]) - truth["theta_low"][at]
+    angle = np.abs(wrapped(offset)).max(axis=1, initial=0.0)
+    return distance(scene.lengths, truth["theta"][at], offset), angle
+
+
+def _divergence(t: FloatArray, error: FloatArray) -> Record:
+    """When the error passes each threshold; a run that ended early has diverged when it ended."""
+    ended = np.append(error, np.inf) if len(error) < len(t) else error
+    crossings = [time_to(t[: len(ended)], ended, threshold) for threshold in THRESHOLDS]
+    return {"crossings": [list(crossing) if crossing else None for crossing in crossings]}
+
+
+def _energies(scene: Scene, run: Trajectory, horizon: float) -> Record:
+    values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
+    whole = drift(run.t, values, scale)
+    half = drift(run.t[run.t <= 0.5 * horizon], values[run.t <= 0.5 * horizon], scale)
+    return {
+        "energy_drift_max": whole.largest,
+        "energy_drift_final": whole.final,
+        "energy_drift_band": whole.band,
+        "energy_drift_slope_per_s": whole.slope,
+        "energy_drift_half": half.largest,
+    }
+
+
+def _curve(scene: Scene, run: Trajectory, error: FloatArray) -> list[list[float | None]]:
+    """t, e and the energy's error of some of the samples; e is None past the horizon."""
+    k = len(run.t)
+    chosen = np.unique(np.linspace(0, k - 1, min(k, _CURVE_POINTS)).astype(int)) if k else []
+    values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
+    strays = (values - values[:1]) / scale if scale else values * 0
+    return [
+        [float(run.t[i]) for i in chosen],
+        [float(error[i]) if i < len(error) else None for i in chosen],
+        [float(strays[i]) for i in chosen],
+    ]
+
+
+def _largest(values: FloatArray) -> float | None:
+    return float(values.max()) if len(values) else None
+
+
+def _at(t: FloatArray, values: FloatArray, time: float) -> float | None:
+    """The largest value up to `time`, or None where t does not get there."""
+    return float(values[t <= time + 1e-9].max()) if len(t) and t[-1] >= time - 1e-9 else None
