@@ -1,3 +1,53 @@
-"""How far can you trust a physics engine? Chains of pendulums against an analytic reference."""
+"""How far can you trust a physics engine? Chains of pendulums against an analytic reference.
+
+The names below are the public face. Each is loaded when first used, so importing the package loads no engine.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from pendbench.engines.conformance import check_engine
+    from pendbench.errors import InputError
+    from pendbench.physics.energy import energy
+    from pendbench.reference import reference
+    from pendbench.scene import Scene, load_scene
+    from pendbench.simulate import simulate
+    from pendbench.study.api import run_study
+    from pendbench.trajectory import Trajectory
+
+_HOMES = {
+    "InputError": "pendbench.errors",
+    "Scene": "pendbench.scene",
+    "Trajectory": "pendbench.trajectory",
+    "check_engine": "pendbench.engines.conformance",
+    "energy": "pendbench.physics.energy",
+    "load_scene": "pendbench.scene",
+    "reference": "pendbench.reference",
+    "run_study": "pendbench.study.api",
+    "simulate": "pendbench.simulate",
+}
+
+__all__ = [
+    "InputError",
+    "Scene",
+    "Trajectory",
+    "check_engine",
+    "energy",
+    "load_scene",
+    "reference",
+    "run_study",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -79,6 +79,12 @@ class Store:
         except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
             return None
 
+    def clear(self) -> None:
+        """Forget all of it."""
+        for ending in ("json", "npz"):
+            for path in self.folder.glob(f"*.{ending}"):
+                path.unlink(missing_ok=True)
+
     def save_arrays(self, key: str, arrays: dict[str, FloatArray]) -> None:
         """Save arrays by name."""
         write_whole(self._path(key, "npz"), lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]

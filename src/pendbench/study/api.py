@@ -1,0 +1,111 @@
+"""Running a study from beginning to end."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pandas as pd
+
+from pendbench.errors import InputError
+from pendbench.report import write_report
+from pendbench.strict import shown_path
+from pendbench.study.baseline import baseline_path, read_baseline, regressions, write_baseline
+from pendbench.study.jobs import LocalPool
+from pendbench.study.kinds import kind
+from pendbench.study.plan import Plan, find_study, load_plan
+from pendbench.study.provenance import provenance
+from pendbench.study.results import Results
+from pendbench.study.runner import Runner, Silence, Watcher
+from pendbench.study.store import Store
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked for. study: a name or a file. out: a folder, `results/NAME` where None. jobs: worker processes."""
+
+    study: str | os.PathLike[str]
+    out: Path | None = None
+    quick: bool = False
+    engines: Sequence[str] = ()
+    jobs: int | None = None
+    check: bool = False
+    fresh: bool = False
+    update_baseline: bool = False
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A study that has run: its results, its folder, and what got worse where that was asked."""
+
+    results: Results
+    out: Path
+    regressions: tuple[str, ...]
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
+def _folder(request: Request, plan: Plan) -> Path:
+    out = request.out if request.out is not None else Path("results") / plan.name
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {shown_path(out)}: {error.strerror}; allowed: a folder that can be written") from None
+    if not os.access(out, os.W_OK):
+        raise InputError(f"--out {shown_path(out)}: not writable; allowed: a folder that can be written")
+    return out
+
+
+def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
+    """Run a study and write its report.
+
+    Raises `InputError`, one line, before anything is written where the request cannot be met.
+    """
+    workers = processors() if request.jobs is None else request.jobs
+    if workers < 1:
+        raise InputError(f"--jobs is {workers}; allowed: 1 or more")
+    plan = load_plan(request.study, quick=request.quick, engines=request.engines)
+    where = baseline_path(find_study(request.study), quick=request.quick)
+    baseline = read_baseline(where) if request.check else None
+    out = _folder(request, plan)
+    store = Store(out / "work")
+    if request.fresh:
+        store.clear()
+    runner = Runner(store, LocalPool(workers), LocalPool(1), watcher or Silence())
+    results = kind(plan.options.kind).run(plan, runner)
+    results = replace(results, provenance=provenance(plan, workers))
+    write_report(results, out)
+    if request.update_baseline:
+        write_baseline(where, results.cases)
+    worse = () if baseline is None else tuple(regressions(results.cases, baseline))
+    return Finished(results, out, worse)
+
+
+def run_study(
+    study: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
+    *,
+    quick: bool = False,
+    engines: Sequence[str] = (),
+    jobs: int | None = None,
+    fresh: bool = False,
+) -> pd.DataFrame:
+    """Run a study, write its report to `out` (default `results/NAME`), and return its table, one row per case.
+
+    study: a bundled study's name or a file. quick: the study's quick variant. engines: only these. jobs: worker
+    processes, one per processor by default. fresh: run again what an earlier run left in `out`. Scripts that call this
+    need the usual `if __name__ == "__main__":` guard, since it starts processes.
+
+    Raises InputError, one line, for whatever cannot be used.
+    """
+    folder = None if out is None else Path(out)
+    request = Request(study, folder, quick=quick, engines=tuple(engines), jobs=jobs, fresh=fresh)
+    return run_request(request).results.cases

@@ -1,0 +1,48 @@
+"""What a result comes from: programs, machine, settings, content."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib import metadata
+from typing import Any
+
+from pendbench import __version__
+from pendbench.engines.registry import engine
+from pendbench.study.plan import Plan
+from pendbench.study.store import source_digest
+
+_LIBRARIES = ("numpy", "scipy", "numba", "pandas")
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
+        return names[0] if names else platform.processor()
+    except OSError:
+        return platform.processor()
+
+
+def provenance(plan: Plan, workers: int) -> dict[str, Any]:
+    """What the results of a plan come from, by name."""
+    names = sorted({case.engine for case in plan.cases})
+    return {
+        "pendbench": __version__,
+        "pendbench source": source_digest(),
+        **{f"engine {name}": engine(name).version() for name in names},
+        **{name: metadata.version(name) for name in _LIBRARIES},
+        "python": platform.python_version(),
+        "operating system": platform.platform(),
+        "processor": _processor(),
+        "logical processors": os.cpu_count(),
+        "worker processes": workers,
+        "threads per engine": 1,
+        **{name: os.environ.get(name, "not set") for name in _THREAD_VARIABLES},
+        "seed": getattr(plan.options, "seed", None),
+        "study": plan.name,
+        "study content": plan.digest,
+        "quick": plan.quick,
+        **{f"scene {scene.name}": scene.digest for scene in plan.scenes},
+    }
