@@ -1,0 +1,103 @@
+"""MuJoCo as an engine: hinges between bodies that are made into point masses, in joint angles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from pendbench.engines.mjcf import compile_chain, joint_values, quiet
+from pendbench.engines.protocol import Fault, Method, Simulation, State
+from pendbench.scene import Scene
+
+_INTEGRATORS: Final = {
+    "euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "rk4": mujoco.mjtIntegrator.mjINT_RK4,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+}
+_METHODS: Final = {
+    "euler": Method(order=1, note="semi-implicit Euler, MuJoCo's default"),
+    "rk4": Method(order=4, note="the classical Runge-Kutta method"),
+    "implicit": Method(order=1, note="Euler, implicit in forces that depend on velocity"),
+    "implicitfast": Method(order=1, note="as implicit, without the Coriolis forces: Euler, where nothing is damped"),
+}
+_EFFECTS: Final = frozenset({"gravity"})
+
+# Limits found with MuJoCo 4.0.0. A deeper chain is refused by its compiler; an offset of 1e-7 m is taken for none, and
+# the motion is wrong without a word.
+_MOST_LINKS: Final = 1023
+_SHORTEST: Final = 1e-6
+_MOST_STEPS_A_CALL: Final = 2**30  # the count of a native call has 32 bits
+
+
+class _Run:
+    """One chain in MuJoCo. Only joint angles and rates are read: all else in MjData lags a step behind."""
+
+    def __init__(self, scene: Scene, method: str, dt: float) -> None:
+        self._model = compile_chain(scene)
+        self._model.opt.integrator = _INTEGRATORS[method]
+        self._model.opt.timestep = dt
+        self._data = mujoco.MjData(self._model)
+        self._data.qpos[:] = joint_values(scene.angles)
+        self._data.qvel[:] = joint_values(scene.rates)
+        self._taken = 0
+
+    def advance(self, steps: int) -> None:
+        self._taken += steps
+        with quiet():
+            while steps > 0:
+                mujoco.mj_step(self._model, self._data, nstep=min(steps, _MOST_STEPS_A_CALL))
+                steps -= _MOST_STEPS_A_CALL
+
+    def state(self) -> State:
+        return State(np.cumsum(self._data.qpos), np.cumsum(self._data.qvel))
+
+    def health(self) -> Fault | None:
+        if not (np.all(np.isfinite(self._data.qpos)) and np.all(np.isfinite(self._data.qvel))):
+            return Fault("not finite", "a joint's angle or rate is not finite")
+        return self._reset() or self._warned()
+
+    def _reset(self) -> Fault | None:
+        """A run that blows up starts again at time 0, unless told not to: its clock is then behind."""
+        time, expected = self._data.time, self._taken * self._model.opt.timestep
+        # The clock is a sum of steps: its rounding grows with their number squared, below a unit in the last place each.
+        slack = self._model.opt.timestep * max(0.5, np.finfo(float).eps * self._taken**2)
+        if abs(time - expected) <= slack:
+            return None
+        return Fault("reset", f"its clock says {time:.6g} s after {expected:.6g} s of steps")
+
+    def _warned(self) -> Fault | None:
+        for kind, warning in enumerate(self._data.warning):
+            if warning.number:
+                return Fault("warned", f"{mujoco.mju_warningText(kind, warning.lastinfo)} ({warning.number} times)")
+        return None
+
+
+class MujocoEngine:
+    """MuJoCo, without its viewer. The same system as ours in the same coordinates: it differs by method and rounding."""
+
+    name = "mujoco"
+    methods: Mapping[str, Method] = _METHODS
+
+    def version(self) -> str:
+        """MuJoCo's own version."""
+        return str(mujoco.__version__)
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Chains that its compiler refuses or takes for others, and effects that this adapter does not translate."""
+        if foreign := sorted(set(scene.effects.named()) - _EFFECTS):
+            return f"the adapter has no {foreign[0]}"
+        if scene.n > _MOST_LINKS:
+            return f"{scene.n} links; MuJoCo compiles chains of at most {_MOST_LINKS} bodies"
+        if scene.lengths.min() < _SHORTEST:
+            return f"a rod of {scene.lengths.min():g} m; MuJoCo takes lengths near 1e-7 m for zero"
+        return None
+
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:  # noqa: ARG002
+        """A run at time 0; no method has settings."""
+        if dt is None:
+            raise ValueError(f"method {method!r} needs a step")
+        return _Run(scene, method, dt)
