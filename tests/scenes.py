@@ -10,6 +10,7 @@ from pendbench.scene import Effects, Scene
 
 def chain(
     n: int,
+    *,
     angle: npt.ArrayLike = np.pi / 2,
     rate: npt.ArrayLike = 0.0,
     length: npt.ArrayLike | None = None,

@@ -54,7 +54,19 @@ def compiled(function: Kernel) -> Kernel:
     return kernel
 
 
-def specialises(generic: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Register a choice, made while compiling and by the types of the arguments, of what `generic` does in a kernel."""
-    chosen: Callable[[Callable[..., Any]], Callable[..., Any]] = overload(generic, jit_options=_OPTIONS)
-    return chosen
+def specialise(generic: Callable[..., None], system: type, kernel: Callable[..., None]) -> None:
+    """Have `generic(s, *rest)`, called in a kernel, be `kernel(s, *rest)` where s is of the NamedTuple class `system`.
+
+    The choice is made while compiling, by the type of s.
+    """
+
+    def choose(s: Any, *rest: Any) -> Callable[..., None] | None:  # noqa: ARG001
+        if getattr(s, "instance_class", None) is not system:
+            return None
+
+        def call(s: Any, *rest: Any) -> None:
+            kernel(s, *rest)
+
+        return call
+
+    overload(generic, jit_options=_OPTIONS, strict=False)(choose)

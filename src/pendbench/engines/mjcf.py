@@ -32,6 +32,8 @@ DEEPEST_FILE: Final = 496
 _AXIS: Final = (0.0, -1.0, 0.0)
 _DISABLED: Final = ("constraint", "contact", "spring", "damper", "actuation", "sensor", "autoreset")
 _FILE_DT: Final = 1e-3
+# What MuJoCo sets aside by itself is too little for its implicit integrators from some 500 links on; 200 n^2 is enough.
+_MEMORY: Final = (16_000_000, 256)
 
 _COMMENT: Final = """
   Written by `python -m pendbench.engines.mjcf`; do not edit.
@@ -68,6 +70,7 @@ def chain_spec(scene: Scene) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = printable(scene.name)
     spec.option.gravity = (0.0, 0.0, -(scene.effects.gravity or 0.0))
+    spec.memory = _MEMORY[0] + _MEMORY[1] * scene.n**2
     spec.option.disableflags = sum(int(_flag(name)) for name in _disabled(scene))
     body, hangs_at = spec.worldbody, 0.0
     for i, (mass, length) in enumerate(zip(_scaled_masses(scene), scene.lengths, strict=True), start=1):
@@ -112,8 +115,8 @@ def write_mjcf(scene: Scene) -> str:
     _add_options(root, scene)
     ET.SubElement(ET.SubElement(root, "custom"), "text", name="title", data=printable(scene.title))
     _add_links(ET.SubElement(root, "worldbody"), scene)
-    start = {"qpos": _text(joint_values(scene.angles)), "qvel": _text(joint_values(scene.rates))}
-    ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="start", **start)
+    qpos, qvel = _text(joint_values(scene.angles)), _text(joint_values(scene.rates))
+    ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="start", qpos=qpos, qvel=qvel)
     ET.indent(root, space=" ")
     return ET.tostring(root, encoding="unicode") + "\n"
 

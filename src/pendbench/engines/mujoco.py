@@ -63,7 +63,7 @@ class _Run:
     def _reset(self) -> Fault | None:
         """A run that blows up starts again at time 0, unless told not to: its clock is then behind."""
         time, expected = self._data.time, self._taken * self._model.opt.timestep
-        # The clock is a sum of steps: its rounding grows with their number squared, below a unit in the last place each.
+        # The clock is a sum of steps: its rounding grows with their number squared, at worst.
         slack = self._model.opt.timestep * max(0.5, np.finfo(float).eps * self._taken**2)
         if abs(time - expected) <= slack:
             return None
@@ -77,13 +77,13 @@ class _Run:
 
 
 class MujocoEngine:
-    """MuJoCo, without its viewer. The same system as ours in the same coordinates: it differs by method and rounding."""
+    """MuJoCo, without its viewer. It has the same equations in joint angles, and differs by method and rounding."""
 
     name = "mujoco"
     methods: Mapping[str, Method] = _METHODS
 
     def version(self) -> str:
-        """MuJoCo's own version."""
+        """The version of MuJoCo itself."""
         return str(mujoco.__version__)
 
     def refuses(self, scene: Scene) -> str | None:

@@ -140,7 +140,7 @@ class PymunkEngine:
     methods: Mapping[str, Method] = _METHODS
 
     def version(self) -> str:
-        """pymunk's own version."""
+        """The version of pymunk itself."""
         return str(pymunk.version)
 
     def refuses(self, scene: Scene) -> str | None:

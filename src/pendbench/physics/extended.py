@@ -8,12 +8,11 @@ their lengths (docs/equations.md).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from pendbench.compiled import compiled, specialises
+from pendbench.compiled import compiled, specialise
 from pendbench.scene import Scene
 from pendbench.solvers.double_double import add, divide, multiply, scale, sine_cosine, subtract
 from pendbench.solvers.extrapolation import extended_derivative
@@ -158,20 +157,8 @@ def _vector_derivative(system: VectorForm, y: FloatArray, dy: FloatArray) -> Non
         dy[2 * n + i, 0], dy[2 * n + i, 1] = divide(across, (lengths[i], 0.0))
 
 
-def _specialise(form: type, kernel: Callable[..., None]) -> None:
-    @specialises(extended_derivative)
-    def _chosen(system: Any, y: Any, dy: Any) -> Callable[..., None] | None:  # noqa: ARG001
-        if getattr(system, "instance_class", None) is not form:
-            return None
-
-        def write(system: Any, y: Any, dy: Any) -> None:
-            kernel(system, y, dy)
-
-        return write
-
-
-_specialise(AngleForm, _angle_derivative)
-_specialise(VectorForm, _vector_derivative)
+specialise(extended_derivative, AngleForm, _angle_derivative)
+specialise(extended_derivative, VectorForm, _vector_derivative)
 
 
 @compiled

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from pendbench.compiled import compiled, specialises
+from pendbench.compiled import compiled, specialise
 from pendbench.physics.system import System
 from pendbench.scene import Scene
 from pendbench.solvers import problem
@@ -64,32 +62,20 @@ def write_accelerations(system: System, theta: FloatArray, omega: FloatArray, ou
     outwards(system, theta, omega, out)
 
 
-def _is_chain(system: Any) -> bool:
-    return getattr(system, "instance_class", None) is System
+@compiled
+def _write_acceleration(system: System, t: float, q: FloatArray, v: FloatArray, a: FloatArray) -> None:  # noqa: ARG001
+    write_accelerations(system, q, v, a)
 
 
-@specialises(problem.acceleration)
-def _acceleration(system: Any, t: Any, q: Any, v: Any, a: Any) -> Callable[..., None] | None:  # noqa: ARG001
-    if not _is_chain(system):
-        return None
-
-    def acceleration(system: Any, t: Any, q: Any, v: Any, a: Any) -> None:  # noqa: ARG001
-        write_accelerations(system, q, v, a)
-
-    return acceleration
+@compiled
+def _write_derivative(system: System, t: float, y: FloatArray, dy: FloatArray) -> None:  # noqa: ARG001
+    n = len(system.masses)
+    dy[:n] = y[n:]
+    write_accelerations(system, y[:n], y[n:], dy[n:])
 
 
-@specialises(problem.derivative)
-def _derivative(system: Any, t: Any, y: Any, dy: Any) -> Callable[..., None] | None:  # noqa: ARG001
-    if not _is_chain(system):
-        return None
-
-    def derivative(system: Any, t: Any, y: Any, dy: Any) -> None:  # noqa: ARG001
-        n = len(system.masses)
-        dy[:n] = y[n:]
-        write_accelerations(system, y[:n], y[n:], dy[n:])
-
-    return derivative
+specialise(problem.acceleration, System, _write_acceleration)
+specialise(problem.derivative, System, _write_derivative)
 
 
 def system_of(scene: Scene) -> System:

@@ -19,3 +19,18 @@ def derivative(system: Any, t: float, y: FloatArray, dy: FloatArray) -> None:
 def acceleration(system: Any, t: float, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
     """Write the second derivative of q (d,) at time t (s), with v (d,) its first, into a (d,)."""
     raise NotImplementedError(f"no acceleration for {type(system).__name__}")
+
+
+def momentum(system: Any, q: FloatArray, v: FloatArray, p: FloatArray) -> None:
+    """Write the conjugate momenta dL/dv at q (d,), v (d,) into p (d,)."""
+    raise NotImplementedError(f"no momentum for {type(system).__name__}")
+
+
+def velocity(system: Any, q: FloatArray, p: FloatArray, v: FloatArray) -> None:
+    """Write the rates v (d,) whose conjugate momenta at q (d,) are p (d,)."""
+    raise NotImplementedError(f"no velocity for {type(system).__name__}")
+
+
+def generalized_force(system: Any, t: float, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
+    """Write dL/dq at time t (s), q (d,), v (d,) into f (d,)."""
+    raise NotImplementedError(f"no generalized force for {type(system).__name__}")

@@ -1,0 +1,111 @@
+"""Which engines there are, and how to get one. Nothing is loaded before it is asked for.
+
+An engine from another package is found through the entry-point group `pendbench.engines`: the entry names a class
+without arguments, or a function, that gives an `Engine`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Final, NamedTuple
+
+from pendbench.engines.protocol import Engine, Method
+from pendbench.errors import InputError, MissingEngineError, choose
+from pendbench.strict import printable, show
+
+GROUP: Final = "pendbench.engines"
+
+Factory = Callable[[], Engine]
+
+# Where each is loaded from, and what pip installs to make that work. pyproject.toml says the same to others; this
+# table serves a source checkout, and keeps other packages from taking these names.
+_BUNDLED: Final = {
+    "analytic": ("pendbench.engines.analytic:AnalyticEngine", "pendbench"),
+    "mujoco": ("pendbench.engines.mujoco:MujocoEngine", "mujoco-core"),
+    "pymunk": ("pendbench.engines.pymunk:PymunkEngine", "pymunk"),
+}
+_registered: dict[str, Factory] = {}
+
+
+def register(name: str, factory: Factory) -> None:
+    """Make an engine known under `name` in this process, in place of any other of that name.
+
+    Worker processes do not see it: an engine that a study is to run in parallel needs an entry point.
+    """
+    _registered[name] = factory
+
+
+def engine_names() -> tuple[str, ...]:
+    """The names of all engines that can be asked for, sorted. None of them is loaded."""
+    return tuple(sorted({*_registered, *_BUNDLED, *entry_points(group=GROUP).names}))
+
+
+def engine(name: str) -> Engine:
+    """The engine of that name, loaded now.
+
+    Raises `InputError` for an unknown name, and `MissingEngineError` for an engine that cannot be loaded, with the
+    command that installs it; one line each. A broken engine does not affect the others.
+    """
+    source = _source(name)
+    try:
+        made = source.load()()
+    except ImportError as error:
+        raise source.missing(f"cannot be loaded ({describe(error)})") from error
+    except Exception as error:
+        raise source.missing(f"is broken ({describe(error)})") from error
+    if problem := _problem(made, name):
+        raise source.missing(f"is not an engine ({problem})")
+    return made
+
+
+def describe(error: BaseException) -> str:
+    """An exception in one line: its type, and the first line of its message."""
+    lines = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {printable(lines[0][:200])}" if lines else type(error).__name__
+
+
+class _Source(NamedTuple):
+    """Where an engine comes from: a function that finds its factory, and the package that holds it, if any."""
+
+    name: str
+    load: Callable[[], Factory]
+    package: str | None
+
+    def missing(self, why: str) -> MissingEngineError:
+        command = f"; install it with: pip install --upgrade {self.package}" if self.package else ""
+        return MissingEngineError(f"engine {self.name!r} {why}{command}")
+
+
+def _source(name: str) -> _Source:
+    if not isinstance(name, str):
+        raise InputError(f"engine is {show(name)}; allowed: a name, {', '.join(engine_names())}")
+    if name in _registered:
+        return _Source(name, lambda: _registered[name], None)
+    if name in _BUNDLED:
+        target, package = _BUNDLED[name]
+        return _Source(name, EntryPoint(name, target, GROUP).load, package)
+    offers = {_package(entry): entry for entry in entry_points(group=GROUP, name=name)}
+    if not offers:
+        raise InputError(choose("engine", printable(name), engine_names()))
+    if len(offers) > 1:
+        raise MissingEngineError(f"engine {name!r} is offered by {' and by '.join(sorted(offers))}; uninstall one")
+    package, entry = offers.popitem()
+    return _Source(name, entry.load, package)
+
+
+def _package(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist else entry.module
+
+
+def _problem(made: Any, name: str) -> str | None:
+    """Why an object is not an engine of that name, or None. The conformance kit looks deeper."""
+    for call in ("version", "refuses", "build"):
+        if not callable(getattr(made, call, None)):
+            return f"it has no {call}()"
+    methods = getattr(made, "methods", None)
+    if not (isinstance(methods, Mapping) and methods and all(isinstance(m, Method) for m in methods.values())):
+        return "its methods are not a mapping of names to Method"
+    if getattr(made, "name", None) != name:
+        return f"it calls itself {show(getattr(made, 'name', None))}"
+    return None

@@ -1,0 +1,204 @@
+"""Every column that a study can have, declared once: its unit, how people read it, what it means.
+
+CSV files, Markdown tables, the terminal and the list of definitions follow these declarations, and numbers become text
+nowhere else. A new measurement gets its line in `COLUMNS`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Column:
+    """unit: empty for text. format: how people read a number: "" text, "d" whole, ".3g" digits, ".1e", ".0%".
+
+    heading: for tables. meaning: one sentence. is_time: whether it depends on the clock and so differs from run to run,
+    on the same machine; all the others can be reproduced. empty: what people read where there is no number.
+    """
+
+    unit: str
+    format: str
+    heading: str
+    meaning: str
+    is_time: bool = False
+    empty: str = "–"
+
+
+def _text(heading: str, meaning: str, *, is_time: bool = False) -> Column:
+    return Column("", "", heading, meaning, is_time, "")
+
+
+def _threshold(name: str) -> dict[str, Column]:
+    key, passes = f"t_{name}", f"e(t) passes {name}"
+    first = f"the first time at which {passes}"
+    return {
+        f"{key}_s": Column("s", ".3g", f"to {name}", f"{first}: the median over the starts (in starts.csv: of one start). "
+                           "Empty where the median start does not get there before the horizon"),
+        f"{key}_min_s": Column("s", ".3g", "earliest", f"the earliest start's time until {passes}"),
+        f"{key}_max_s": Column("s", ".3g", "latest", f"the latest start's time until {passes}; empty where a start does "
+                               "not get there before its horizon"),
+        f"{key}_lyapunov": Column("Lyapunov times", ".3g", "Lyapunov times", f"`{key}_s` times the scene's Lyapunov "
+                                  "exponent; empty where the motion is regular"),
+        f"{key}_not_reached": Column("1", "d", "not reached", f"starts in which {passes} not before the horizon"),
+        f"{key}_band_s": Column("s", ".1e", "band", "the widest gap between the two samples around one of these times: "
+                                "how well it is known"),
+    }  # fmt: skip
+
+
+_WHAT: Final = {
+    "scene": _text("scene", "the scene's name"),
+    "n": Column("1", "d", "n", "links of the chain"),
+    "start": Column("1", "d", "start", "0: the scene's own start; the others are perturbed"),
+    "engine": _text("engine", "the program that simulated"),
+    "method": _text("method", "one way in which the engine advances time"),
+    "dt": Column("s", ".3g", "step, s", "the step; empty for a method that chooses its own", empty="its own"),
+    "settings": _text("settings", "settings of the method that differ from its defaults"),
+    "status": _text("status", "how the case ended: as the worst of its starts did"),
+    "reason": _text("reason", "why, where it did not end well"),
+}
+
+_TRUTH: Final = {
+    "duration_s": Column("s", ".3g", "duration, s", "how long the scene lasts"),
+    "starts": Column("1", "d", "starts", "starts that were run: the scene's own and the perturbed ones"),
+    "horizon_s": Column("s", ".4g", "horizon, s", "until when the reference is known; nothing is compared past it"),
+    "horizon_min_s": Column("s", ".4g", "earliest horizon, s", "the earliest horizon of the starts"),
+    "horizon_max_s": Column("s", ".4g", "latest horizon, s", "the latest horizon of the starts"),
+    "reference_error": Column("L", ".1e", "reference error", "the largest e between the reference's two solves up to "
+                              "the horizon"),
+    "lyapunov_per_s": Column("1/s", ".3g", "Lyapunov exponent, 1/s", "the rate at which neighbouring starts of the scene "
+                             "part; in causes.csv empty where the motion is regular"),
+    "lyapunov_error_per_s": Column("1/s", ".1g", "its error, 1/s", "the standard error of the exponent, over blocks of "
+                                   "time"),
+    "chaotic": _text("chaotic", "whether the exponent can be told from regular motion"),
+}  # fmt: skip
+
+_ERRORS: Final = {
+    "t_s": Column("s", ".4g", "t, s", "time"),
+    "error": Column("L", ".1e", "e", "the largest distance of any mass from where it should be; empty past the horizon"),
+    "energy_error": Column("energy scale", ".1e", "energy error", "deviation of the energy from its first value"),
+    "error_max": Column("L", ".1e", "e max", "the largest e(t) up to the horizon, or to where the run ended"),
+    "error_half": Column("L", ".1e", "e to half horizon", "the largest e(t) up to half of the horizon"),
+    "angle_error_max_rad": Column("rad", ".1e", "angle error", "the largest error of any angle, wrapped, up to the "
+                                  "horizon"),
+    "reference_error_half": Column("L", ".1e", "reference error to half", "the reference's own e up to half of the "
+                                   "horizon"),
+}  # fmt: skip
+
+_ENERGY: Final = {
+    "energy_drift_max": Column("energy scale", ".1e", "energy drift", "the largest deviation of the energy from its "
+                               "first value, over the whole run"),
+    "energy_drift_final": Column("energy scale", ".1e", "final drift", "the deviation of the energy at the run's end"),
+    "energy_drift_band": Column("energy scale", ".1e", "band", "the energy's largest value less its smallest one"),
+    "energy_drift_slope_per_s": Column("energy scale/s", ".1e", "drift per s", "the slope of a least-squares line "
+                                       "through the energy: near zero for a method that keeps it in a band"),
+    "energy_drift_half": Column("energy scale", ".1e", "drift to half", "the largest deviation up to half of the "
+                                "horizon"),
+    "gap_max": Column("1", ".1e", "joint gap", "how far the worst rod was from its length, over that length; 0 for "
+                      "engines that work in angles"),
+}  # fmt: skip
+
+_CAUSES: Final = {
+    "model_error": Column("1", ".1e", "model error", "how far the engine's accelerations are from the equations', over "
+                          "the largest acceleration"),
+    "model_error_limit": Column("1", ".1e", "known to", "how well the model error is known"),
+    "order_claimed": Column("1", "d", "order claimed", "the method's order by its makers", empty="adaptive"),
+    "order_observed": Column("1", ".3g", "order observed", "the order with which the error falls between two steps"),
+    "order_dt_coarse": Column("s", ".3g", "from step, s", "the coarser of the two steps that show the order"),
+    "order_dt_fine": Column("s", ".3g", "to step, s", "the finer of the two steps that show the order"),
+    "plateau": Column("L", ".1e", "plateau", "the error below which a smaller step does not bring it", empty="none"),
+    "growth_per_s": Column("1/s", ".3g", "growth, 1/s", "the rate of the exponential through e(t) between 1e-12 and 1e-2 "
+                           "(in causes.csv: the median over starts and steps)"),
+    "cause": _text("cause", "what makes this method leave the truth"),
+}  # fmt: skip
+
+_COSTS: Final = {
+    "step_us": Column("us", ".3g", "step, µs", "the median cost of a step", is_time=True),
+    "step_spread": Column("1", ".0%", "spread", "largest less smallest sample of the step's cost, over the median",
+                          is_time=True),
+    "simulated_s_per_s": Column("s/s", ".3g", "simulated s/s", "simulated time per time spent stepping", is_time=True),
+    "build_s": Column("s", ".2g", "build, s", "building the run", is_time=True),
+    "first_call_s": Column("s", ".2g", "first call, s", "the first step of all, with what is compiled or loaded then",
+                           is_time=True),
+    "run_s": Column("s", ".3g", "run, s", "time spent stepping up to the horizon", is_time=True),
+    "flags": _text("flags", "what a reader should know about the row, the quality of its timing included", is_time=True),
+}  # fmt: skip
+
+#: Every column by its name in the CSV files, in the order in which they are written.
+COLUMNS: Final = MappingProxyType(
+    {
+        **_WHAT,
+        **_TRUTH,
+        **_ERRORS,
+        **_threshold("1e-3"),
+        **_threshold("1e-2"),
+        **_threshold("1e-1"),
+        **_ENERGY,
+        **_CAUSES,
+        **_COSTS,
+    }
+)
+
+_UNKNOWN: Final = Column("", ".4g", "", "")
+
+
+def column(name: str) -> Column:
+    """The declaration of a column; one that nobody declared is shown with four digits."""
+    return COLUMNS.get(name, _UNKNOWN)
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """The names as declared, and those that nobody declared last."""
+    places = {name: place for place, name in enumerate(COLUMNS)}
+    return sorted(names, key=lambda name: places.get(name, len(places)))
+
+
+def is_missing(value: Any) -> bool:
+    """Whether there is no value: None, not a number, or empty text."""
+    return value is None or type(value).__name__ == "NAType" or value == "" or value != value
+
+
+def shown(name: str, value: Any) -> str:
+    """A value of a column for people. Text comes back as it is: whoever writes it escapes it."""
+    if is_missing(value):
+        return column(name).empty
+    return value if isinstance(value, str) else number_text(value, column(name).format or ".4g")
+
+
+def number_text(value: Any, spec: str = ".3g") -> str:
+    """A number for people: three digits rather than an exponent where it is of everyday size."""
+    if isinstance(value, (bool, np.bool_)):
+        return "yes" if value else "no"
+    number = float(value)
+    if math.isnan(number):
+        return "–"
+    if math.isinf(number):
+        return "infinite" if number > 0 else "-infinite"
+    if spec == "d":
+        return f"{number:.0f}"
+    text = f"{number:{spec}}"
+    if spec.endswith("g"):
+        text = f"{float(text):.6g}"
+    return re.sub(r"e([+-])0*(\d)", lambda m: f"e{m[1].strip('+')}{m[2]}", text)
+
+
+def stored(name: str, value: Any) -> str | int | float:
+    """A value of a column for a CSV file: numbers to the last digit, nothing where there is none, text as it is."""
+    if is_missing(value):
+        return ""
+    if isinstance(value, (bool, np.bool_)):
+        return "true" if value else "false"
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        number = float(value)
+        # A column of whole numbers becomes one of floats where a table lacks some of them.
+        return int(number) if column(name).format == "d" and number.is_integer() else repr(number)
+    return str(value)

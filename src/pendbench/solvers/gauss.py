@@ -1,0 +1,130 @@
+"""Gauss-Legendre collocation in canonical variables: implicit, symplectic, of order twice the number of stages.
+
+The stages are solved by fixed-point iteration, which asks for steps shorter than the fastest motion in the system.
+Sources: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3, VI.6.2 (momenta from a Lagrangian), VIII.6
+(iteration until rounding, starting values from the polynomial of the step before); compensated summation against the
+drift of rounding: Hairer, McLachlan, Razakarivony, BIT 48 (2008).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pendbench.compiled import compiled
+from pendbench.solvers.problem import generalized_force, velocity
+from pendbench.trajectory import FloatArray
+
+_MOST_ITERATIONS = 60
+
+
+class Collocation(NamedTuple):
+    """a (s, s), b (s,), c (s,); extrapolate (s, s) takes values at c to those at 1 + c; order 2 s."""
+
+    a: FloatArray
+    b: FloatArray
+    c: FloatArray
+    extrapolate: FloatArray
+    order: int
+
+
+def gauss_legendre(stages: int) -> Collocation:
+    """The method with nodes at the roots of the shifted Legendre polynomial of degree `stages`."""
+    roots, weights = np.polynomial.legendre.leggauss(stages)
+    c = 0.5 * (roots + 1.0)
+    degrees = np.arange(stages)
+    powers = c[:, None] ** degrees
+    to_coefficients = np.linalg.inv(powers)
+    integrals = c[:, None] ** (degrees + 1) / (degrees + 1)
+    return Collocation(
+        a=integrals @ to_coefficients,
+        b=0.5 * weights,
+        c=c,
+        extrapolate=((1.0 + c)[:, None] ** degrees) @ to_coefficients,
+        order=2 * stages,
+    )
+
+
+@compiled
+def _combine(weights: FloatArray, h: float, start: FloatArray, slopes: FloatArray, out: FloatArray) -> None:
+    """out = start + h sum_j weights[j] slopes[j]."""
+    for i in range(len(start)):
+        total = 0.0
+        for j in range(len(weights)):
+            total += weights[j] * slopes[j, i]
+        out[i] = start[i] + h * total
+
+
+@compiled
+def _add(weights: FloatArray, h: float, slopes: FloatArray, y: FloatArray, carry: FloatArray) -> None:
+    """y += h sum_j weights[j] slopes[j], with the rounding errors kept in `carry`."""
+    for i in range(len(y)):
+        total = 0.0
+        for j in range(len(weights)):
+            total += weights[j] * slopes[j, i]
+        small = h * total + carry[i]
+        value = y[i] + small
+        carry[i] = small - (value - y[i])
+        y[i] = value
+
+
+@compiled
+def _guess(extrapolate: FloatArray, slopes: FloatArray, room: FloatArray) -> None:
+    """Replace the slopes of the step before by what their polynomial says of this one."""
+    room[:] = slopes
+    for s in range(len(extrapolate)):
+        for i in range(slopes.shape[1]):
+            total = 0.0
+            for j in range(len(extrapolate)):
+                total += extrapolate[s, j] * room[j, i]
+            slopes[s, i] = total
+
+
+@compiled
+def collocate(
+    system: Any,
+    method: Collocation,
+    t: float,
+    h: float,
+    q: FloatArray,
+    p: FloatArray,
+    carry: FloatArray,
+    slopes: FloatArray,
+    steps: int,
+) -> int:
+    """Take steps of h from time t, changing q (d,) and p (d,) in place; return how many converged.
+
+    carry (2, d): what rounding left out of q and p. slopes (2, s, d): the rates and forces at the stages of the step
+    before, to begin the iteration with. Both are kept between calls. Stops at the first step whose stages do not
+    converge.
+    """
+    stages, d = len(method.b), len(q)
+    rates, forces = slopes[0], slopes[1]
+    inner_q, inner_p, new = np.empty(d), np.empty(d), np.empty(d)
+    room = np.empty((stages, d))
+    for step in range(steps):
+        _guess(method.extrapolate, rates, room)
+        _guess(method.extrapolate, forces, room)
+        change, before = np.inf, np.inf
+        for iteration in range(_MOST_ITERATIONS):
+            before, change = change, 0.0
+            for s in range(stages):
+                _combine(method.a[s], h, q, rates, inner_q)
+                _combine(method.a[s], h, p, forces, inner_p)
+                velocity(system, inner_q, inner_p, new)
+                for i in range(d):
+                    change = max(change, abs(new[i] - rates[s, i]))
+                    rates[s, i] = new[i]
+                generalized_force(system, t + (step + method.c[s]) * h, inner_q, new, forces[s])
+            # Rounding has the last word: iterate until the change no longer falls.
+            if change == 0.0 or (iteration > 1 and change >= before):
+                break
+        size = 0.0
+        for i in range(d):
+            size = max(size, abs(rates[0, i]))
+        if not change <= 1e-9 * (1.0 + size):
+            return step
+        _add(method.b, h, rates, q, carry[0])
+        _add(method.b, h, forces, p, carry[1])
+    return steps
