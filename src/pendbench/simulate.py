@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Method, Setting, Simulation, State
-from pendbench.engines.registry import describe, engine as engine_of
+from pendbench.engines.registry import describe
+from pendbench.engines.registry import engine as engine_of
 from pendbench.errors import InputError, choose
-from pendbench.scene import Scene, load_scene
+from pendbench.scene import Range, Scene, load_scene
 from pendbench.strict import printable, show
 from pendbench.trajectory import STATUSES, FloatArray, Trajectory
 
@@ -24,6 +25,7 @@ SAMPLES: Final = 1000
 #: How far a time may be from a whole number of steps, in steps.
 SLACK: Final = 1e-6
 
+_DT: Final = Range(1e-50, 1e50, "s")
 _MOST_STEPS: Final = 2**53  # beyond this, floats do not count
 
 
@@ -63,12 +65,13 @@ def simulate(
 
     Raises `InputError`, one line, for whatever is asked for that makes no sense.
     """
-    return record(plan(scene, engine, method, dt, times, settings))
+    return record(plan(scene, engine, method=method, dt=dt, times=times, settings=settings))
 
 
 def plan(
     scene: Scene | str | os.PathLike[str],
     engine: str | Engine,
+    *,
     method: str | None,
     dt: float | None,
     times: npt.ArrayLike | None,
@@ -84,8 +87,9 @@ def plan(
     step = _step(name, its.methods[name], dt)
     asked = None if times is None else _times(times)
     if step is None:
-        spaced = np.linspace(0.0, chosen.duration, SAMPLES + 1)
-        return Plan(chosen, its, name, None, spaced if asked is None else asked, None, numbers)
+        if asked is None:
+            asked = np.linspace(0.0, chosen.duration, SAMPLES + 1, dtype=np.float64)
+        return Plan(chosen, its, name, None, asked, None, numbers)
     counts = _even_counts(chosen.duration, step) if asked is None else _counts(asked, step)
     return Plan(chosen, its, name, step, counts * step, counts, numbers)
 
@@ -111,11 +115,11 @@ def _step(name: str, method: Method, dt: object) -> float | None:
         if dt is not None:
             raise InputError(f"dt is {show(dt)}; allowed: none, since method {name!r} chooses its steps")
         return None
-    step: Any = dt
-    if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < step < math.inf or not 0.0 < float(step):
+    try:
+        return _DT.number(dt)
+    except ValueError as error:
         found = "missing" if dt is None else show(dt)
-        raise InputError(f"dt is {found}; allowed: a number above 0, the step of method {name!r} in s")
-    return float(step)
+        raise InputError(f"dt is {found}; allowed: {error}, the step of method {name!r}") from None
 
 
 def _times(times: npt.ArrayLike) -> FloatArray:
@@ -133,7 +137,8 @@ def _times(times: npt.ArrayLike) -> FloatArray:
 
 def _counts(times: FloatArray, dt: float) -> npt.NDArray[np.int64]:
     """How many steps each time is from the start."""
-    counts = _bounded(times / dt, dt)
+    with np.errstate(over="ignore"):
+        counts = _bounded(times / dt, dt)
     whole = np.rint(counts)
     astray = np.flatnonzero(np.abs(counts - whole) > SLACK)
     if astray.size:
@@ -163,7 +168,7 @@ def record(asked: Plan) -> Trajectory:
     samples = Samples(asked.scene.n)
     try:
         refusal = asked.engine.refuses(asked.scene)
-        fault = Fault("refused", refusal) if refusal is not None else _fill(samples, asked)
+        fault = Fault("refused", str(refusal)) if refusal is not None else _fill(samples, asked)
     except MemoryError as error:
         fault = Fault("out of memory", describe(error))
     except Exception as error:
