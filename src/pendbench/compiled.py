@@ -6,8 +6,11 @@ the equations of motion compiled into them. So the cache's folder is named after
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import inspect
 import os
+import shutil
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -15,42 +18,66 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core import config
+from numba.core import config as numba_config
 from numba.extending import overload
 
+config: Any = numba_config  # its attributes are set while it is imported
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).resolve().parent
 _KERNEL_SOURCES = ("compiled.py", "physics/*.py", "solvers/*.py")
 
 #: Division by zero gives inf or nan, as in numpy: a test before each division would cost time and catch nothing.
-_OPTIONS = {"error_model": "numpy"}
+_OPTIONS: Any = {"error_model": "numpy"}
+
+_kernels: list[Any] = []
+_sources_outside: list[Path] = []
+
+
+def cache_folder() -> str:
+    """Where this process keeps its machine code: it changes with whatever is compiled into the kernels."""
+    return _writable_folder(_digest(tuple(_sources_outside)))
 
 
 @cache
-def _cache_folder() -> str:
+def _digest(outside: tuple[Path, ...]) -> str:
     digest = hashlib.sha256(f"numba {numba.__version__}".encode())
-    for pattern in _KERNEL_SOURCES:
-        for source in sorted(_PACKAGE.glob(pattern)):
-            digest.update(source.read_bytes())
-    home = config.CACHE_DIR or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(home) / "pendbench" / digest.hexdigest()[:16]
+    inside = (source for pattern in _KERNEL_SOURCES for source in sorted(_PACKAGE.glob(pattern)))
+    for source in (*inside, *outside):
+        # What was typed at a prompt has no file to compare: nothing that was compiled before is used for it.
+        digest.update(source.read_bytes() if source.is_file() else os.urandom(16))
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _writable_folder(name: str) -> str:
+    """A folder below NUMBA_CACHE_DIR or the user's cache; where that cannot be, one for this process only."""
     try:
+        home = config.CACHE_DIR or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(home) / "pendbench" / name
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-    except OSError:
-        return tempfile.mkdtemp(prefix="pendbench-kernels-")
+    except (OSError, RuntimeError):  # RuntimeError: this user has no home
+        temporary = tempfile.mkdtemp(prefix="pendbench-kernels-")
+        atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+        return temporary
     return str(folder)
+
+
+def _keep_on_disk(kernel: Any) -> None:
+    folder, before = cache_folder(), config.CACHE_DIR
+    config.CACHE_DIR = folder
+    try:
+        kernel.enable_caching()
+    finally:
+        config.CACHE_DIR = before
 
 
 def compiled(function: Kernel) -> Kernel:
     """Compile `function` when it is first called, and keep the machine code on disk."""
-    before = config.CACHE_DIR
-    config.CACHE_DIR = _cache_folder()
-    try:
-        kernel: Kernel = numba.njit(cache=True, **_OPTIONS)(function)
-    finally:
-        config.CACHE_DIR = before
+    kernel: Kernel = numba.njit(**_OPTIONS)(function)
+    _keep_on_disk(kernel)
+    _kernels.append(kernel)
     return kernel
 
 
@@ -59,6 +86,7 @@ def specialise(generic: Callable[..., None], system: type, kernel: Callable[...,
 
     The choice is made while compiling, by the type of s.
     """
+    _know_source(Path(inspect.getfile(inspect.unwrap(kernel))).resolve())
 
     def choose(s: Any, *rest: Any) -> Callable[..., None] | None:  # noqa: ARG001
         if getattr(s, "instance_class", None) is not system:
@@ -70,3 +98,16 @@ def specialise(generic: Callable[..., None], system: type, kernel: Callable[...,
         return call
 
     overload(generic, jit_options=_OPTIONS, strict=False)(choose)
+
+
+def _know_source(source: Path) -> None:
+    """Give a process that has a system from outside the package a cache of its own.
+
+    In the common one nobody would notice that kernels for that system are stale, and the name of its type would keep
+    every process that cannot import it from reading the cache at all.
+    """
+    if _PACKAGE in source.parents or source in _sources_outside:
+        return
+    _sources_outside.append(source)
+    for kernel in _kernels:
+        _keep_on_disk(kernel)

@@ -88,20 +88,38 @@ def _weights(columns: int) -> FloatArray:
     return neville_weights(columns)
 
 
-def _march(scene: Scene, times: FloatArray) -> Iterator[tuple[FloatArray, float]]:
-    """The angle form's state (2 n, 2) and its distance from the vector form's, at each time, as long as both go on."""
-    from pendbench.physics.extended import angle_form, form_difference, vector_form
-    from pendbench.physics.geometry import distance
-
-    angles = _Solve(*angle_form(scene), _weights(_COLUMNS[0]))
-    vectors = _Solve(*vector_form(scene), _weights(_COLUMNS[1]))
+def _solve(system: Any, state: FloatArray, columns: int, times: FloatArray) -> Iterator[FloatArray]:
+    solve = _Solve(system, state, _weights(columns))
     t = 0.0
     for end in times:
-        if not (angles.advance(t, end) and vectors.advance(t, end)):
+        if not solve.advance(t, end):
             return
         t = float(end)
-        difference = form_difference(angles.state, vectors.state)
-        yield angles.state.copy(), float(distance(scene.lengths, angles.state[: scene.n, 0], difference))
+        yield solve.state
+
+
+def solve_angles(scene: Scene, times: FloatArray) -> Iterator[FloatArray]:
+    """The angle form's state (2 n, 2) at each time (s, rising), the same array each time, as long as it goes on."""
+    from pendbench.physics.extended import angle_form
+
+    return _solve(*angle_form(scene), _COLUMNS[0], times)
+
+
+def solve_vectors(scene: Scene, times: FloatArray) -> Iterator[FloatArray]:
+    """The vector form's state (3 n, 2) at each time (s, rising), the same array each time, as long as it goes on."""
+    from pendbench.physics.extended import vector_form
+
+    return _solve(*vector_form(scene), _COLUMNS[1], times)
+
+
+def _march(scene: Scene, times: FloatArray) -> Iterator[tuple[FloatArray, float]]:
+    """The angle form's state (2 n, 2) and its distance from the vector form's, at each time, as long as both go on."""
+    from pendbench.physics.extended import form_difference
+    from pendbench.physics.geometry import distance
+
+    for angles, vectors in zip(solve_angles(scene, times), solve_vectors(scene, times), strict=False):
+        difference = form_difference(angles, vectors)
+        yield angles.copy(), float(distance(scene.lengths, angles[: scene.n, 0], difference))
 
 
 def reference(scene: Scene, times: npt.ArrayLike | None = None) -> Truth:

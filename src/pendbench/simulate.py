@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Method, Setting, Simulation, State
-from pendbench.engines.registry import describe
+from pendbench.engines.registry import describe, engine_names, flaw_of
 from pendbench.engines.registry import engine as engine_of
 from pendbench.errors import InputError, choose
 from pendbench.scene import Range, Scene, load_scene
@@ -80,24 +80,26 @@ def plan(
     """Check what `simulate` was asked for. Raises `InputError`."""
     chosen = scene if isinstance(scene, Scene) else load_scene(scene)
     its = engine_of(engine) if isinstance(engine, str) else engine
+    if flaw := flaw_of(its):
+        raise InputError(f"engine is {show(engine)}, which is none ({flaw}); allowed: {', '.join(engine_names())}")
     name = next(iter(its.methods)) if method is None else method
     if name not in its.methods:
-        raise InputError(choose(f"method of {its.name}", printable(str(name)), its.methods))
+        raise InputError(f"engine {its.name!r}: {choose('method', printable(str(name)), its.methods)}")
     numbers = _settings(name, its.methods[name], settings)
     step = _step(name, its.methods[name], dt)
     asked = None if times is None else _times(times)
     if step is None:
         if asked is None:
-            asked = np.linspace(0.0, chosen.duration, SAMPLES + 1, dtype=np.float64)
+            asked = np.linspace(0.0, chosen.duration, SAMPLES + 1)
         return Plan(chosen, its, name, None, asked, None, numbers)
     counts = _even_counts(chosen.duration, step) if asked is None else _counts(asked, step)
-    return Plan(chosen, its, name, step, counts * step, counts, numbers)
+    return Plan(chosen, its, name, step, np.asarray(counts * step, np.float64), counts, numbers)
 
 
 def _settings(name: str, method: Method, given: Mapping[str, float | None]) -> dict[str, float]:
     for key in given:
         if key not in method.settings:
-            raise InputError(choose(f"setting of method {name!r}", printable(key), method.settings))
+            raise InputError(f"method {name!r}: {choose('setting', printable(key), method.settings)}")
     return {key: _setting(key, method.settings[key], value) for key, value in given.items() if value is not None}
 
 

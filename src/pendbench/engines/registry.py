@@ -54,8 +54,10 @@ def engine(name: str) -> Engine:
         raise source.missing(f"cannot be loaded ({describe(error)})") from error
     except Exception as error:
         raise source.missing(f"is broken ({describe(error)})") from error
-    if problem := _problem(made, name):
-        raise source.missing(f"is not an engine ({problem})")
+    if flaw := flaw_of(made):
+        raise source.missing(f"is not an engine ({flaw})")
+    if made.name != name:
+        raise source.missing(f"calls itself {show(made.name)}")
     return made
 
 
@@ -78,8 +80,6 @@ class _Source(NamedTuple):
 
 
 def _source(name: str) -> _Source:
-    if not isinstance(name, str):
-        raise InputError(f"engine is {show(name)}; allowed: a name, {', '.join(engine_names())}")
     if name in _registered:
         return _Source(name, lambda: _registered[name], None)
     if name in _BUNDLED:
@@ -87,7 +87,7 @@ def _source(name: str) -> _Source:
         return _Source(name, EntryPoint(name, target, GROUP).load, package)
     offers = {_package(entry): entry for entry in entry_points(group=GROUP, name=name)}
     if not offers:
-        raise InputError(choose("engine", printable(name), engine_names()))
+        raise InputError(choose("engine", printable(str(name)), engine_names()))
     if len(offers) > 1:
         raise MissingEngineError(f"engine {name!r} is offered by {' and by '.join(sorted(offers))}; uninstall one")
     package, entry = offers.popitem()
@@ -98,14 +98,14 @@ def _package(entry: EntryPoint) -> str:
     return entry.dist.name if entry.dist else entry.module
 
 
-def _problem(made: Any, name: str) -> str | None:
-    """Why an object is not an engine of that name, or None. The conformance kit looks deeper."""
+def flaw_of(made: Any) -> str | None:
+    """What an object lacks to be an engine, or None. The conformance kit looks deeper."""
+    if not isinstance(getattr(made, "name", None), str):
+        return "it has no name"
     for call in ("version", "refuses", "build"):
         if not callable(getattr(made, call, None)):
             return f"it has no {call}()"
     methods = getattr(made, "methods", None)
     if not (isinstance(methods, Mapping) and methods and all(isinstance(m, Method) for m in methods.values())):
         return "its methods are not a mapping of names to Method"
-    if getattr(made, "name", None) != name:
-        return f"it calls itself {show(getattr(made, 'name', None))}"
     return None

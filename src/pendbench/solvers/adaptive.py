@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,7 +55,17 @@ def _scaled_error(method: EmbeddedPair, h: float, k: FloatArray, scale: FloatArr
             return np.inf
     if worst5 == 0.0:
         return 0.0
-    return abs(h) * worst5 * worst5 / np.hypot(worst5, 0.1 * worst3)
+    return abs(h) * worst5 * worst5 / math.hypot(worst5, 0.1 * worst3)
+
+
+@compiled
+def _step_factor(error: float, order: int) -> float:
+    """By how much the step may change after one with this scaled error."""
+    if error == 0.0:
+        return _GROW_AT_MOST
+    if not np.isfinite(error):
+        return _SHRINK_AT_MOST
+    return min(_GROW_AT_MOST, max(_SHRINK_AT_MOST, _SAFETY * error ** (-1.0 / order)))
 
 
 @compiled
@@ -84,8 +95,8 @@ def integrate(
     """Advance y (d,), in place, from time t to exactly `end` with steps that keep the local error allowed.
 
     h: the first step to try (s). carry (d,): what rounding left out of y, kept between calls. relative (d,): the error
-    allowed in y[i] is `tolerance (1 + relative[i] |y[i]|)`. Gives up at a step below `smallest` (s), after `most_steps`
-    accepted or rejected, or at a state that is not finite.
+    allowed in y[i] is `tolerance (1 + relative[i] |y[i]|)`. Gives up at a step below `smallest` (s) or too small
+    to change t, after `most_steps` accepted or rejected, or at a state that is not finite.
 
     Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.4 (step control) and II.10.
     """
@@ -102,6 +113,8 @@ def integrate(
         step = left if last else (0.5 * left if h > 0.5 * left else h)
         target = end if last else t + step
         step = target - t  # what rounding makes of it, so that time does not slip
+        if step <= 0.0:
+            return Progress(TOO_SMALL, t, h, accepted, rejected)
         for i in range(d):
             scale[i] = tolerance * (1.0 + relative[i] * abs(y[i]))
         for s in range(stages):
@@ -110,11 +123,7 @@ def integrate(
         if not np.all(np.isfinite(k[0])):
             return Progress(NOT_FINITE, t, h, accepted, rejected)
         error = _scaled_error(method, step, k, scale)
-        factor = _SHRINK_AT_MOST
-        if error == 0.0:
-            factor = _GROW_AT_MOST
-        elif np.isfinite(error):
-            factor = min(_GROW_AT_MOST, max(_SHRINK_AT_MOST, _SAFETY * error ** (-1.0 / method.order)))
+        factor = _step_factor(error, method.order)
         if error <= 1.0:
             change[:] = 0.0
             for s in range(stages):

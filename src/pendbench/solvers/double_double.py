@@ -60,14 +60,16 @@ _PER_STEP = float(16 / _PI)
 _STEP_1, _STEP_2, _STEP_3 = split(_PI / 16, 3)
 
 
-@intrinsic
-def _fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:  # noqa: ARG001
+def _multiply_add(typingctx: Any, a: Any, b: Any, c: Any) -> Any:  # noqa: ARG001
     """`a b + c`, rounded once."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ARG001
         return builder.fma(*args)
 
     return types.float64(types.float64, types.float64, types.float64), codegen
+
+
+_fma: Any = intrinsic(_multiply_add)
 
 
 @compiled

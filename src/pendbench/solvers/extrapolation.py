@@ -43,7 +43,9 @@ def _axpy(out: FloatArray, y: FloatArray, h: Number, dy: FloatArray) -> None:
 @compiled
 def _midpoint(system: Any, y: FloatArray, dy: FloatArray, h: Number, steps: int, room: FloatArray) -> FloatArray:
     """The state after `steps` steps of the modified midpoint rule over h, from y with derivative dy."""
-    before, now, slope = room[0], room[1], room[2]
+    before: FloatArray = room[0]
+    now: FloatArray = room[1]
+    slope = room[2]
     substep = divide(h, (float(steps), 0.0))
     twice = (2.0 * substep[0], 2.0 * substep[1])
     before[:] = y
@@ -109,6 +111,8 @@ def integrate_extended(
         last = h >= left
         step = left if last else (0.5 * left if h > 0.5 * left else h)
         target = end if last else t + step
+        if target <= t:
+            return Progress(TOO_SMALL, t, h, accepted, rejected)
         # Times are doubles, so the step between two of them is not: a rounded one would show in the 17th digit.
         exact_step = subtract((target, 0.0), (t, 0.0))
         extended_derivative(system, y, dy)

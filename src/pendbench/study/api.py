@@ -79,8 +79,8 @@ def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
     store = Store(out / "work")
     if request.fresh:
         store.clear()
-    runner = Runner(store, LocalPool(workers), LocalPool(1), watcher or Silence())
-    results = kind(plan.options.kind).run(plan, runner)
+    with LocalPool(workers) as pool:
+        results = kind(plan.options.kind).run(plan, Runner(store, pool, watcher or Silence()))
     results = replace(results, provenance=provenance(plan, workers))
     write_report(results, out)
     if request.update_baseline:

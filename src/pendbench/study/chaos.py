@@ -26,7 +26,9 @@ from pendbench.study.results import Results
 from pendbench.study.runner import Runner, distinct
 from pendbench.study.store import key_of
 from pendbench.study.work import (
+    KERNELS,
     THRESHOLDS,
+    compile_kernel,
     failed_run,
     measure_exponent,
     measure_model,
@@ -93,6 +95,7 @@ class _Chaos:
 
     def measure(self) -> None:
         """Run what the study asks for."""
+        self._compile()
         self._measure_truths()
         self._measure_runs()
         self._measure_models()
@@ -100,6 +103,11 @@ class _Chaos:
 
     def _job(self, function: Any, depends_on: tuple[object, ...], *arguments: Any) -> Job:
         return Job(key_of(function.__name__, *depends_on), function, arguments, self.options.time_limit)
+
+    def _compile(self) -> None:
+        scene = self.plan.scenes[0]
+        jobs = [self._job(compile_kernel, (name,), name, scene) for name in KERNELS]
+        self.runner.run("compiled kernels", jobs, lambda _, fault: _fault(fault))
 
     def _measure_truths(self) -> None:
         jobs, owners = [], {}

@@ -6,13 +6,16 @@ process with it is an outcome with a status, and the others go on.
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
-from typing import Any, Protocol
+from types import TracebackType
+from typing import Any, Protocol, Self
 
 from pendbench.engines.protocol import Fault
+from pendbench.engines.registry import describe
 from pendbench.errors import InputError
 
 
@@ -38,36 +41,41 @@ class Outcome:
 class Executor(Protocol):
     """Anything that can run jobs."""
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
-        """The outcome of each job, in the order in which they finish."""
-
-
-def describe(error: BaseException) -> str:
-    """An exception in one line."""
-    lines = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {lines[0][:200]}" if lines else type(error).__name__
+    def run(self, jobs: Iterable[Job], *, alone: bool = False) -> Iterator[Outcome]:
+        """The outcome of each job, in the order in which they finish. alone: one at a time, for timings."""
 
 
 class LocalPool:
-    """Processes of this machine."""
+    """Processes of this machine, from `with` to its end."""
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
+        self._pool: Any = None
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
-        """The outcome of each job. Closing the iterator ends the jobs that still run."""
+    def __enter__(self) -> Self:
         from pebble import ProcessPool
 
-        with ProcessPool(max_workers=self.workers, context=multiprocessing.get_context("spawn")) as pool:
-            waiting = {pool.schedule(j.function, args=j.arguments, timeout=j.time_limit): j for j in jobs}
-            try:
-                while waiting:
-                    done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-                    for future in done:
-                        yield _outcome(waiting.pop(future), future)
-            finally:
-                if waiting:
-                    pool.stop()
+        self._pool = ProcessPool(max_workers=self.workers, context=multiprocessing.get_context("spawn"))
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if kind is None:
+            self._pool.close()
+        else:
+            self._pool.stop()
+        self._pool.join()
+
+    def run(self, jobs: Iterable[Job], *, alone: bool = False) -> Iterator[Outcome]:
+        """The outcome of each job, in the order in which they finish."""
+        queue, running = iter(jobs), {}
+        room = 1 if alone else 2 * self.workers
+        while True:
+            for job in itertools.islice(queue, room - len(running)):
+                running[self._pool.schedule(job.function, args=job.arguments, timeout=job.time_limit)] = job
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                yield _outcome(running.pop(future), future)
 
 
 def _outcome(job: Job, future: Any) -> Outcome:

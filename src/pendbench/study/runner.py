@@ -33,24 +33,24 @@ class Silence:
 
 @dataclass(frozen=True)
 class Runner:
-    """Where jobs run and what they leave behind. `alone` runs one at a time, for timings."""
+    """Where jobs run and what they leave behind."""
 
     store: Store
-    together: Executor
-    alone: Executor
+    executor: Executor
     watcher: Watcher = field(default_factory=Silence)
 
     def run(
         self, stage: str, jobs: Sequence[Job], on_fault: Callable[[Job, Fault], Any], *, alone: bool = False
     ) -> dict[str, Any]:
-        """The value of each job by its key. `on_fault` says what stands for a job that did not return.
+        """The value of each job by its key. `on_fault` says what stands for a job that did not return; alone: one job
+        at a time, for timings.
 
         Values are of JSON's types. Faults are kept as well, but for time limits: a slow day should not stay on record.
         """
         values = {job.key: value for job in jobs if (value := self.store.load(job.key)) is not None}
         waiting = [job for job in jobs if job.key not in values]
         self.watcher.begin(stage, len(jobs), len(values))
-        for outcome in (self.alone if alone else self.together).run(waiting):
+        for outcome in self.executor.run(waiting, alone=alone):
             value = outcome.value if outcome.fault is None else on_fault(outcome.job, outcome.fault)
             if outcome.fault is None or outcome.fault.status != "timed out":
                 self.store.save(outcome.job.key, value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -10,7 +11,7 @@ from pendbench.engines.protocol import Fault
 from pendbench.engines.registry import engine
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance, wrapped
-from pendbench.reference import reference
+from pendbench.reference import reference, solve_angles, solve_vectors
 from pendbench.scene import Scene
 from pendbench.simulate import simulate
 from pendbench.study.case import Case
@@ -29,6 +30,22 @@ THRESHOLDS: Final = (1e-3, 1e-2, 1e-1)
 _CURVE_POINTS: Final = 250
 _GROWTH_FROM: Final = 1e-12
 _GROWTH_TO: Final = 1e-2
+
+
+#: Kernels that a study needs, each with what compiles it: once on a machine, and side by side.
+KERNELS: Final[dict[str, Callable[[Scene], object]]] = {
+    "angle form": lambda scene: next(solve_angles(scene, np.array([1e-9]))),
+    "vector form": lambda scene: next(solve_vectors(scene, np.array([1e-9]))),
+    "adaptive": lambda scene: simulate(scene, "analytic", "adaptive", times=[1e-9]),
+    "rk4": lambda scene: simulate(scene, "analytic", "rk4", 1e-9, [1e-9]),
+    "euler": lambda scene: simulate(scene, "analytic", "euler", 1e-9, [1e-9]),
+}
+
+
+def compile_kernel(name: str, scene: Scene) -> Record:
+    """Compile a kernel, or load it where that was done before."""
+    KERNELS[name](scene)
+    return {}
 
 
 def measure_truth(scene: Scene, times: FloatArray, store: Store, key: str) -> Record:

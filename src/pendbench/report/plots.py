@@ -1,0 +1,107 @@
+"""What every plot has in common: colours, strokes, axes, and bytes that depend on nothing but what is drawn."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from pendbench.report.columns import number_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Colour = tuple[float, float, float]
+
+DPI: Final = 100
+GREY: Final = "0.35"
+
+# Okabe and Ito's colours, which people who confuse red and green tell apart too (jfly.uni-koeln.de/color).
+_HUES: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_DASHES: Final[tuple[Any, ...]] = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)), (0, (10, 3)))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A plot: the name of its file in `plots/`, what people read under it, and its bytes."""
+
+    name: str
+    caption: str
+    png: bytes
+
+
+def draw(figure_of: Callable[[], Figure]) -> bytes:
+    """The PNG of the figure that `figure_of` makes, in the library's own style whatever the user's is."""
+    import matplotlib.style
+
+    with matplotlib.style.context("default"):
+        figure, file = figure_of(), io.BytesIO()
+        figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
+    return file.getvalue()
+
+
+def hue(index: int) -> str:
+    """The colour of the engine with this place in the study."""
+    return _HUES[index % len(_HUES)]
+
+
+def shades(colour: str, count: int) -> list[Colour]:
+    """`count` shades of a colour, from dark to light, none of them near black or white."""
+    from matplotlib.colors import to_rgb
+
+    base = to_rgb(colour)
+    if count == 1:
+        return [base]
+    mixes = [-0.5 + 0.95 * i / (count - 1) for i in range(count)]
+    return [_mixed(base, 0.0 if mix < 0 else 1.0, abs(mix)) for mix in mixes]
+
+
+def _mixed(base: Colour, other: float, share: float) -> Colour:
+    red, green, blue = ((1 - share) * part + share * other for part in base)
+    return red, green, blue
+
+
+def dashes(index: int) -> Any:
+    """The stroke of the step with this place among the steps."""
+    return _DASHES[index % len(_DASHES)]
+
+
+def panels(count: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
+    """A figure with `count` panels of this size, inches, that share their axes, at most `columns` in a row."""
+    from matplotlib.figure import Figure
+
+    across = max(1, min(count, columns))
+    down = math.ceil(count / across)
+    figure = Figure(figsize=(max(6.0, width * across), height * down), layout="constrained")
+    axes = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel().tolist()
+    for spare in axes[count:]:
+        spare.remove()
+    for shown in axes[max(0, count - across) : count]:  # below these there is no panel that could bear their labels
+        shown.tick_params(labelbottom=True)
+    return figure, axes[:count]
+
+
+def logarithmic(axes: Axes, low: float, high: float) -> None:
+    """A logarithmic vertical axis from low to high, labelled at whole decades."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+
+    axes.set_yscale("log")
+    axes.set_ylim(low, high)
+    decades = max(1, math.ceil(math.log10(high / low) / 8))
+    axes.yaxis.set_major_locator(LogLocator(base=10.0**decades, numticks=20))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number_text(value, ".0e")))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.grid(axis="y", color="0.9", linewidth=0.6)
+
+
+def bounds(values: Sequence[float], lowest: float, highest: float) -> tuple[float, float]:
+    """Whole decades around the positive values, within `lowest` and `highest`."""
+    seen = [value for value in values if 0 < value < math.inf]
+    low, high = (min(seen), max(seen)) if seen else (lowest, highest)
+    bottom = max(lowest, 10.0 ** math.floor(math.log10(low) - 0.05))
+    top = min(highest, 10.0 ** math.ceil(math.log10(high) + 0.05))
+    return (bottom, top) if top > 10 * bottom else (top / 100, top)
