@@ -122,32 +122,43 @@ def _march(scene: Scene, times: FloatArray) -> Iterator[tuple[FloatArray, float]
         yield angles.copy(), float(distance(scene.lengths, angles[: scene.n, 0], difference))
 
 
+def _rising(times: npt.ArrayLike) -> FloatArray:
+    try:
+        array = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    except (TypeError, ValueError):
+        array = np.array([np.nan])
+    fits = array.ndim == 1 and array.size > 0 and bool(np.all(np.isfinite(array)))
+    if not (fits and array[0] >= 0.0 and np.all(np.diff(array) > 0.0)):
+        raise InputError("times cannot be used; allowed: one or more finite, rising numbers from 0 on, s")
+    return array
+
+
 def reference(scene: Scene, times: npt.ArrayLike | None = None) -> Truth:
     """The truth for `scene` at `times` (k,) s, by default 1001 times over its duration, until its horizon.
 
-    Raises InputError where times are not finite, not rising, or negative. Source: docs/measuring.md.
+    Raises InputError where times are none, or not finite, not rising, or negative. Source: docs/measuring.md.
     """
-    wanted = np.linspace(0.0, scene.duration, 1001) if times is None else np.atleast_1d(np.asarray(times, float))
-    if not np.all(np.isfinite(wanted)) or wanted.ndim != 1 or np.any(np.diff(wanted) <= 0) or np.any(wanted < 0):
-        raise InputError("times: allowed are finite, rising numbers from 0 on")
-    states, gaps = [], []
+    wanted = np.linspace(0.0, scene.duration, 1001) if times is None else _rising(times)
+    states, gaps, reason = [], [], ""
     for state, gap in _march(scene, wanted):
         if not gap <= AGREEMENT:
+            reason = "ends at its horizon: past it the two solves no longer agree"
             break
         states.append(state)
         gaps.append(gap)
     n, k = scene.n, len(states)
     stacked = np.array(states).reshape(k, 2 * n, 2)
     disagreement = np.array(gaps)
-    whole = k == len(wanted)
+    if k < len(wanted) and not reason:
+        reason = "ends where one of its solves would have needed more steps, or smaller ones, than it is allowed"
     return Truth(
         t=wanted[:k],
         theta=stacked[:, :n, 0],
         omega=stacked[:, n:, 0],
         gap=np.zeros(k),
-        reason="" if whole else "ends at its horizon: past it the two solves no longer agree",
+        reason=reason,
         horizon=float(wanted[k - 1]) if k else 0.0,
-        error=np.float64(disagreement.max() if k else 0.0),
+        error=float(disagreement.max()) if k else 0.0,
         disagreement=disagreement,
         theta_low=stacked[:, :n, 1],
         omega_low=stacked[:, n:, 1],

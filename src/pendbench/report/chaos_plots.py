@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: The name of the plot that is about all scenes.
+COST: Final = "cost"
+
 _THRESHOLDS: Final = (1e-3, 1e-2, 1e-1)
 _MARKERS: Final = "osD^vPhp*"
 _ENDED: Final[dict[str, Any]] = {
@@ -87,21 +90,25 @@ def pictures(results: Results) -> Iterator[Picture]:
     cases = records(results.cases)
     look = Look.of(cases)
     curves = records(results.tables.get("curves"))
-    names: dict[str, None] = {}
+    names = {COST}
     for scene in records(results.tables.get("scenes")):
         own = of(curves, scene=word(scene, "scene"))
         for column, picture_of in (("error", _error_picture), ("energy_error", _energy_picture)):
-            lines = _lines(own, column, records(results.tables.get("starts")))
+            until = number(scene, "horizon_s") if column == "error" else math.inf
+            lines = _lines(own, column, records(results.tables.get("starts")), until)
             if lines:
                 name = file_name(f"{column}_{word(scene, 'scene')}", names)
-                names[name] = None
+                names.add(name)
                 yield picture_of(name, scene, look, lines)
     if cost := _cost_picture(cases, look):
         yield cost
 
 
-def _lines(curves: Sequence[Row], column: str, starts: Sequence[Row]) -> list[_Line]:
-    """The curves in one column, one for each case, without what a logarithm cannot show."""
+def _lines(curves: Sequence[Row], column: str, starts: Sequence[Row], until: float) -> list[_Line]:
+    """The curves in one column, one for each case, without what a logarithm cannot show.
+
+    A run has ended badly where it says so and stopped before `until`, s.
+    """
     groups: dict[tuple[object, ...], list[Row]] = {}
     for row in curves:
         groups.setdefault(_key(row), []).append(row)
@@ -112,7 +119,7 @@ def _lines(curves: Sequence[Row], column: str, starts: Sequence[Row]) -> list[_L
         seen = [(t, y) for t, y in points if math.isfinite(t) and 0 < y < math.inf]
         if seen:
             t, y = (list(values) for values in zip(*seen, strict=True))
-            lines.append(_Line(rows[0], t, y, key in failed))
+            lines.append(_Line(rows[0], t, y, key in failed and not number(rows[-1], "t_s") > until))
     return lines
 
 
@@ -132,10 +139,8 @@ def _error_picture(name: str, scene: Row, look: Look, lines: list[_Line]) -> Pic
     figure = _curves(look, lines, (low, high), "e, in lengths of the chain", _title(scene, "error"), finish)
     return Picture(
         name,
-        "Error e(t) against time, from the scene's own start: a panel for each engine, a shade for each method, a stroke "
-        "for each step. Wide lines lie below thin ones, so that methods which give the same numbers show as one line with "
-        "a rim. Grey lines: the thresholds 1e-3, 1e-2 and 1e-1. Black line: the horizon, past which nothing is compared. "
-        "Crosses: a run ended there. A straight rise on this axis is exponential growth.",
+        word(scene, "scene"),
+        f"{word(scene, 'scene')}: the error e(t) against time, up to the horizon.",
         draw(figure),
     )
 
@@ -147,8 +152,8 @@ def _energy_picture(name: str, scene: Row, look: Look, lines: list[_Line]) -> Pi
                      lambda axes: _mark_horizon(axes, scene))  # fmt: skip
     return Picture(
         name,
-        "The largest energy error so far against time: |E(t) - E(0)| over the scene's energy scale. Flat: the method keeps "
-        "the energy in a band. Rising: it drifts. What runs along the top is beyond it: it has blown up.",
+        word(scene, "scene"),
+        f"{word(scene, 'scene')}: the largest energy error so far against time.",
         draw(figure),
     )
 
@@ -249,7 +254,8 @@ def _cost_picture(cases: Sequence[Row], look: Look) -> Picture | None:
         return figure
 
     return Picture(
-        "cost",
+        COST,
+        "",
         "Cost against time to divergence (e = 1e-2), a panel for each scene: right is longer, down is cheaper. A line joins "
         "the steps of one method, finer steps further up. Open arrows at the horizon (black line): the median start does "
         "not pass 1e-2 before it. Crosses: cases that did not end well, at the time they passed 1e-2 or ended.",

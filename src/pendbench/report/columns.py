@@ -37,17 +37,16 @@ def _text(heading: str, meaning: str, *, is_time: bool = False) -> Column:
 
 
 def _threshold(name: str) -> dict[str, Column]:
-    key, passes = f"t_{name}", f"e(t) passes {name}"
-    first = f"the first time at which {passes}"
+    key, passes = f"t_{name}", "e(t) passes the threshold in the column's name"
     return {
-        f"{key}_s": Column("s", ".3g", f"to {name}", f"{first}: the median over the starts (in starts.csv: of one start). "
-                           "Empty where the median start does not get there before the horizon"),
+        f"{key}_s": Column("s", ".3g", f"to {name}, s", f"the first time at which {passes}: the median over the starts (in "
+                           "starts.csv: of one start); empty where the median start does not get there before its horizon"),
         f"{key}_min_s": Column("s", ".3g", "earliest", f"the earliest start's time until {passes}"),
         f"{key}_max_s": Column("s", ".3g", "latest", f"the latest start's time until {passes}; empty where a start does "
                                "not get there before its horizon"),
-        f"{key}_lyapunov": Column("Lyapunov times", ".3g", "Lyapunov times", f"`{key}_s` times the scene's Lyapunov "
-                                  "exponent; empty where the motion is regular"),
-        f"{key}_not_reached": Column("1", "d", "not reached", f"starts in which {passes} not before the horizon"),
+        f"{key}_lyapunov": Column("Lyapunov times", ".3g", "Lyapunov times", "the median time, s, times the scene's "
+                                  "Lyapunov exponent; empty where the motion is regular"),
+        f"{key}_not_reached": Column("1", "d", "not reached", "how many starts do not get there before their horizon"),
         f"{key}_band_s": Column("s", ".1e", "band", "the widest gap between the two samples around one of these times: "
                                 "how well it is known"),
     }  # fmt: skip
@@ -108,7 +107,8 @@ _ENERGY: Final = {
 _CAUSES: Final = {
     "model_error": Column("1", ".1e", "model error", "how far the engine's accelerations are from the equations', over "
                           "the largest acceleration"),
-    "model_error_limit": Column("1", ".1e", "known to", "how well the model error is known"),
+    "model_error_limit": Column("1", ".1e", "last change", "what the last refinement changed in the model error: how well "
+                                "it is known, give or take a factor of some tens"),
     "order_claimed": Column("1", "d", "order claimed", "the method's order by its makers", empty="adaptive"),
     "order_observed": Column("1", ".3g", "order observed", "the order with which the error falls between two steps"),
     "order_dt_coarse": Column("s", ".3g", "from step, s", "the coarser of the two steps that show the order"),
@@ -181,8 +181,12 @@ def number_text(value: Any, spec: str = ".3g") -> str:
         return "–"
     if math.isinf(number):
         return "infinite" if number > 0 else "-infinite"
+    if number == 0:
+        return "0"
     if spec == "d":
         return f"{number:.0f}"
+    if spec.endswith("e") and 0.1 <= abs(number) < 1000:
+        spec = ".2g"
     text = f"{number:{spec}}"
     if spec.endswith("g"):
         text = f"{float(text):.6g}"

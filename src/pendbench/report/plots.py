@@ -26,9 +26,10 @@ _DASHES: Final[tuple[Any, ...]] = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (6, 
 
 @dataclass(frozen=True)
 class Picture:
-    """A plot: the name of its file in `plots/`, what people read under it, and its bytes."""
+    """A plot: the name of its file in `plots/`, the scene it is about (or none), its caption, and its bytes."""
 
     name: str
+    scene: str
     caption: str
     png: bytes
 
@@ -79,7 +80,7 @@ def panels(count: int, columns: int, width: float, height: float) -> tuple[Figur
     axes = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel().tolist()
     for spare in axes[count:]:
         spare.remove()
-    for shown in axes[max(0, count - across) : count]:  # below these there is no panel that could bear their labels
+    for shown in axes[:count]:
         shown.tick_params(labelbottom=True)
     return figure, axes[:count]
 

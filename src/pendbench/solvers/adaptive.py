@@ -95,8 +95,9 @@ def integrate(
     """Advance y (d,), in place, from time t to exactly `end` with steps that keep the local error allowed.
 
     h: the first step to try (s). carry (d,): what rounding left out of y, kept between calls. relative (d,): the error
-    allowed in y[i] is `tolerance (1 + relative[i] |y[i]|)`. Gives up at a step below `smallest` (s) or too small
-    to change t, after `most_steps` accepted or rejected, or at a state that is not finite.
+    allowed in y[i] is `tolerance (1 + relative[i] |y[i]|)`. Gives up where it needs a step below `smallest` (s)
+    or below the rounding of t (only the last step, onto `end`, may be as short as it likes), after `most_steps`
+    accepted or rejected, or at a state that is not finite.
 
     Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.4 (step control) and II.10.
     """
@@ -105,6 +106,7 @@ def integrate(
     inner, scale, change = np.empty(d), np.empty(d), np.empty(d)
     accepted, rejected = 0, 0
     grow = _GROW_AT_MOST
+    h = max(h, smallest)
     while t < end:
         if accepted + rejected >= most_steps:
             return Progress(TOO_MANY, t, h, accepted, rejected)
@@ -113,7 +115,7 @@ def integrate(
         step = left if last else (0.5 * left if h > 0.5 * left else h)
         target = end if last else t + step
         step = target - t  # what rounding makes of it, so that time does not slip
-        if step <= 0.0:
+        if not last and (h < smallest or t + 0.1 * h == t):
             return Progress(TOO_SMALL, t, h, accepted, rejected)
         for i in range(d):
             scale[i] = tolerance * (1.0 + relative[i] * abs(y[i]))
@@ -139,6 +141,4 @@ def integrate(
             rejected += 1
             grow = 1.0
             h = step * min(factor, 1.0)
-            if h < smallest:
-                return Progress(TOO_SMALL, t, h, accepted, rejected)
     return Progress(DONE, t, h, accepted, rejected)

@@ -104,6 +104,7 @@ def integrate_extended(
     columns, d = len(weights), len(y)
     table, room, dy = np.empty((columns, d, 2)), np.empty((3, d, 2)), np.empty((d, 2))
     accepted, rejected = 0, 0
+    h = max(h, smallest)
     while t < end:
         if accepted + rejected >= most_steps:
             return Progress(TOO_MANY, t, h, accepted, rejected)
@@ -111,7 +112,7 @@ def integrate_extended(
         last = h >= left
         step = left if last else (0.5 * left if h > 0.5 * left else h)
         target = end if last else t + step
-        if target <= t:
+        if not last and (h < smallest or t + 0.1 * h == t):
             return Progress(TOO_SMALL, t, h, accepted, rejected)
         # Times are doubles, so the step between two of them is not: a rounded one would show in the 17th digit.
         exact_step = subtract((target, 0.0), (t, 0.0))
@@ -133,6 +134,4 @@ def integrate_extended(
         else:
             rejected += 1
             h = step * min(factor, 0.9)
-            if h < smallest:
-                return Progress(TOO_SMALL, t, h, accepted, rejected)
     return Progress(DONE, t, h, accepted, rejected)

@@ -208,6 +208,7 @@ class _Chaos:
             "reference_error": truths[0].get("error", math.nan),
             "lyapunov_per_s": exponent.get("rate", math.nan),
             "lyapunov_error_per_s": exponent.get("error", math.nan),
+            "growth_per_s": truths[0].get("growth", math.nan),
             "chaotic": bool(exponent.get("chaotic", False)),
             "status": truths[0].get("status", "ok"),
             "reason": truths[0].get("reason", ""),
@@ -247,6 +248,7 @@ class _Chaos:
             "order_dt_fine": fit.fine if fit else math.nan,
             "plateau": fit.plateau if fit and fit.plateau is not None else math.nan,
             "growth_per_s": float(np.median(known)) if known else math.nan,
+            "neighbours_growth_per_s": self.truths[first.scene.name, 0].get("growth", math.nan),
             "lyapunov_per_s": self._exponent(first.scene.name),
         }
         return {**record, "cause": flags.cause(record)}

@@ -11,7 +11,7 @@ from pendbench.engines.protocol import Fault
 from pendbench.engines.registry import engine
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance, wrapped
-from pendbench.reference import reference, solve_angles, solve_vectors
+from pendbench.reference import Truth, reference, solve_angles, solve_vectors
 from pendbench.scene import Scene
 from pendbench.simulate import simulate
 from pendbench.study.case import Case
@@ -28,6 +28,7 @@ Record = dict[str, Any]
 THRESHOLDS: Final = (1e-3, 1e-2, 1e-1)
 
 _CURVE_POINTS: Final = 250
+_APART: Final = 1e-10
 _GROWTH_FROM: Final = 1e-12
 _GROWTH_TO: Final = 1e-2
 
@@ -53,7 +54,20 @@ def measure_truth(scene: Scene, times: FloatArray, store: Store, key: str) -> Re
     truth = reference(scene, times)
     names = ("t", "theta", "omega", "theta_low", "disagreement")
     store.save_arrays(key, {name: getattr(truth, name) for name in names})
-    return {"horizon": truth.horizon, "error": float(truth.error), "status": truth.status, "reason": truth.reason}
+    return {
+        "horizon": truth.horizon,
+        "error": float(truth.error),
+        "growth": _growth_of_neighbours(scene, truth),
+        "status": truth.status,
+        "reason": truth.reason,
+    }
+
+
+def _growth_of_neighbours(scene: Scene, truth: Truth) -> float:
+    """The rate, 1/s, at which a start 1e-10 rad away leaves the truth: what chaos does to any small error here."""
+    neighbour = simulate(scene.with_start(scene.angles + _APART, scene.rates), times=truth.t)
+    offset = truth.offset(neighbour.theta)
+    return growth_rate(truth.t[: len(offset)], distance(scene.lengths, truth.theta[: len(offset)], offset), _GROWTH_FROM, _GROWTH_TO)
 
 
 def measure_exponent(scene: Scene, seconds: float) -> Record:
@@ -134,7 +148,8 @@ def _divergence(t: FloatArray, error: FloatArray) -> Record:
 
 
 def _energies(scene: Scene, run: Trajectory, horizon: float) -> Record:
-    values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
+    with np.errstate(over="ignore"):  # a run that blew up has an infinite energy
+        values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
     whole = drift(run.t, values, scale)
     half = drift(run.t[run.t <= 0.5 * horizon], values[run.t <= 0.5 * horizon], scale)
     return {
@@ -150,7 +165,8 @@ def _curve(scene: Scene, run: Trajectory, error: FloatArray) -> list[list[float 
     """t, e and the energy's error of some of the samples; e is None past the horizon."""
     k = len(run.t)
     chosen = np.unique(np.linspace(0, k - 1, min(k, _CURVE_POINTS)).astype(int)) if k else []
-    values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
+    with np.errstate(over="ignore"):
+        values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
     strays = (values - values[:1]) / scale if scale else values * 0
     return [
         [float(run.t[i]) for i in chosen],
