@@ -117,7 +117,7 @@ def test_units_of_mass_that_are_powers_of_two_change_no_bit():
     np.testing.assert_array_equal(after(scene, "rk4", 1e-3, 100).omega, after(other, "rk4", 1e-3, 100).omega)
 
 
-@pytest.mark.parametrize(("mass", "length"), [(1e-30, 1.0), (1e30, 1.0), (1.0, 1e6), (1.0, 1e-6), (1e-20, 1e-5)])
+@pytest.mark.parametrize(("mass", "length"), [(1e-30, 1.0), (1e30, 1.0), (1.0, 1e12), (1.0, 1e-6), (1e-20, 1e-5)])
 def test_masses_and_lengths_far_from_one_are_represented(mass, length):
     scene = chain(3, angle=[0.3, -0.2, 0.5], mass=mass, length=length)
     exact = accelerations(scene, scene.angles, scene.rates)

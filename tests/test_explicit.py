@@ -75,7 +75,7 @@ def test_rk4_goes_on_where_it_stopped(drive):
 
 
 def test_euler_moves_the_rates_first():
-    """With v <- v - h w^2 q, then q <- q + h v, keeps w^2 q^2 + v^2 - h w^2 q v exactly; the other order, another form."""
+    """With v <- v - h w^2 q, then q <- q + h v, this form is kept exactly; the other order keeps another."""
     h, w = 0.2, OSCILLATOR.frequency
 
     def kept(y):

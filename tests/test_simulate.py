@@ -10,11 +10,12 @@ from pendbench.engines.registry import engine, engine_names
 from pendbench.errors import InputError
 from pendbench.physics.dense import accelerations
 from pendbench.scene import load_scene
-from pendbench.simulate import simulate
+from pendbench.recording import simulate
 from scenes import chain
 from tampered import Passing, Tampered, honest_build, wrapping
 
 SCENE = chain(2, angle=[0.5, 0.3], duration=1.0)
+STEPS = {"dt": 0.1, "times": np.arange(11) * 0.1}
 
 EVERY_METHOD = [(name, method) for name in engine_names() for method in engine(name).methods]
 
@@ -88,6 +89,24 @@ def test_samples_do_not_depend_on_each_other():
     np.testing.assert_array_equal(few.omega[-1], many.omega[-1])
 
 
+def test_no_engine_is_asked_for_no_steps():
+    class Proud(Passing):
+        def advance(self, steps):
+            assert steps > 0
+            self.inner.advance(steps)
+
+        def advance_to(self, time):
+            assert time > 0.0
+            return self.inner.advance_to(time)
+
+    assert simulate(SCENE, wrapping(Proud), **STEPS).status == "ok"
+    adaptive = Tampered(
+        make=lambda scene, *given: Proud(honest_build(scene, *given)),
+        methods={"adaptive": engine("analytic").methods["adaptive"]},
+    )
+    assert simulate(SCENE, adaptive, times=[0.0, 0.1]).status == "ok"
+
+
 def test_settings_reach_the_engine():
     kept = {}
 
@@ -149,8 +168,6 @@ def test_what_makes_no_sense_is_refused_in_one_line(arguments, said):
 
 
 # Runs that go wrong end in a status, and keep what was right.
-
-STEPS = {"dt": 0.1, "times": np.arange(11) * 0.1}
 
 
 class After(Passing):

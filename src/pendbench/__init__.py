@@ -1,6 +1,7 @@
 """How far can you trust a physics engine? Chains of pendulums against an analytic reference.
 
-The names below are the public face. Each is loaded when first used, so importing the package loads no engine.
+The names below are the public face. Each is loaded when first used, so importing the package loads no engine. No
+module has the name of a public function: importing the one would hide the other.
 """
 
 from importlib import import_module
@@ -12,9 +13,9 @@ if TYPE_CHECKING:
     from pendbench.engines.conformance import check_engine
     from pendbench.errors import InputError
     from pendbench.physics.energy import energy
-    from pendbench.reference import reference
+    from pendbench.truth import reference
     from pendbench.scene import Scene, load_scene
-    from pendbench.simulate import simulate
+    from pendbench.recording import simulate
     from pendbench.study.api import run_study
     from pendbench.trajectory import Trajectory
 
@@ -25,9 +26,9 @@ _HOMES = {
     "check_engine": "pendbench.engines.conformance",
     "energy": "pendbench.physics.energy",
     "load_scene": "pendbench.scene",
-    "reference": "pendbench.reference",
+    "reference": "pendbench.truth",
     "run_study": "pendbench.study.api",
-    "simulate": "pendbench.simulate",
+    "simulate": "pendbench.recording",
 }
 
 __all__ = [

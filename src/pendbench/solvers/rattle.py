@@ -17,7 +17,7 @@ _MOST_ITERATIONS = 50
 
 
 class Rods(NamedTuple):
-    """masses (n,) kg, lengths (n,) m, gravity m/s^2, scratch (9, n)."""
+    """masses (n,) kg, lengths (n,) m, gravity m/s^2, scratch (8, n)."""
 
     masses: FloatArray
     lengths: FloatArray
@@ -82,11 +82,31 @@ def _fill(
 
 
 @compiled
-def rattle(rods: Rods, h: float, points: FloatArray, speeds: FloatArray, forces: FloatArray, steps: int) -> int:
+def _count_turns(old_x: FloatArray, new_x: FloatArray, new_y: FloatArray, turns: FloatArray) -> None:
+    """A rod above the pivot whose x changes sign went over the top (with less than a quarter turn a step)."""
+    for i in range(len(turns)):
+        if new_y[i] > 0.0:
+            if old_x[i] >= 0.0 > new_x[i]:
+                turns[i] += 1.0
+            elif old_x[i] < 0.0 <= new_x[i]:
+                turns[i] -= 1.0
+
+
+@compiled
+def rattle(
+    rods: Rods,
+    h: float,
+    points: FloatArray,
+    speeds: FloatArray,
+    forces: FloatArray,
+    turns: FloatArray,
+    steps: int,
+) -> int:
     """Take steps of h (s), changing points (n, 2) m and speeds (n, 2) m/s in place; return how many were taken.
 
-    forces (n,): the rods' multipliers of the step before, to begin Newton's method with; kept between calls. Stops at
-    the first step whose rods cannot be brought to their lengths.
+    forces (n,): the rods' multipliers of the step before, to begin Newton's method with; kept between calls. turns
+    (n,): how often each rod went over the top, counter-clockwise positive. Stops at the first step whose rods cannot be
+    brought to their lengths.
     """
     masses, lengths, n = rods.masses, rods.lengths, len(rods.masses)
     old_x, old_y, new_x, new_y = rods.scratch[0], rods.scratch[1], rods.scratch[2], rods.scratch[3]
@@ -120,6 +140,7 @@ def rattle(rods: Rods, h: float, points: FloatArray, speeds: FloatArray, forces:
                 speeds[i, axis] = (trial[i, axis] - points[i, axis]) / h
                 points[i, axis] = trial[i, axis]
             speeds[i, 1] -= 0.5 * h * rods.gravity
+        _count_turns(old_x, new_x, new_y, turns)
         # The rods' ends must not move along the rods: linear in the second half of the forces.
         _fill(masses, new_x, new_y, new_x, new_y, below, diagonal, above)
         for i in range(n):

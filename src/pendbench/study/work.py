@@ -11,9 +11,9 @@ from pendbench.engines.protocol import Fault
 from pendbench.engines.registry import engine
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance, wrapped
-from pendbench.reference import Truth, reference, solve_angles, solve_vectors
+from pendbench.truth import Truth, reference, solve_angles, solve_vectors
 from pendbench.scene import Scene
-from pendbench.simulate import simulate
+from pendbench.recording import simulate
 from pendbench.study.case import Case
 from pendbench.study.causes import model_error
 from pendbench.study.clock import time_case
