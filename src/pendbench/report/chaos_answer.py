@@ -57,8 +57,8 @@ def answer(results: Results) -> str:
     ranked = sorted(candidates, key=lambda candidate: (-candidate.score, candidate.cost, candidate.name))
     if not ranked or ranked[0].score <= 0:
         return (
-            f"None of the {counted(len(cases), 'case')} of this study stayed with the truth for any time that could be "
-            "measured. The reasons are listed under what failed."
+            f"None of the {counted(len(cases), 'case')} of this study stayed with the truth for any time that could "
+            "be measured. The reasons are listed under what failed."
         )
     best = ranked[0]
     where = f"in the {kind} scene {scenes[0]}" if len(scenes) == 1 else f"in the {len(scenes)} {kind} scenes"
@@ -134,12 +134,12 @@ def _says(candidate: _Candidate) -> str:
     clauses = []
     if left:
         times = spanned([stay.time for stay in left], _TIME)
-        share = _percents([stay.share for stay in left])
-        clauses.append(f"leaves it after {times} s ({share} of the horizon)")
+        where = f" in {counted(len(left), 'scene')}" if stayed or failed else ""
+        clauses.append(f"leaves it after {times} s ({_percents([stay.share for stay in left])} of the horizon){where}")
     if stayed:
-        horizons = spanned(finite([stay.row for stay in stayed], "horizon_s") or [math.nan], "horizon_s")
-        where = "" if len(stayed) == len(candidate.stays) else f" in {counted(len(stayed), 'scene')}"
-        clauses.append(f"does not leave it{where} before the horizon ({horizons} s)")
+        horizon = spanned(finite([stay.row for stay in stayed], "horizon_s") or [math.nan], "horizon_s")
+        where = f" in {counted(len(stayed), 'scene')}" if left or failed else ""
+        clauses.append(f"{'not' if left else 'does not leave it'} before the horizon ({horizon} s){where}")
     if failed:
         clauses.append(f"fails in {counted(failed, 'scene')}")
     return f"{listed(clauses)}, {_price(candidate)}"

@@ -14,6 +14,11 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+import pandas as pd
+
+
+#: What people read where there is nothing to be read.
+NOTHING: Final = "\u2013"
 
 
 @dataclass(frozen=True)
@@ -29,7 +34,7 @@ class Column:
     heading: str
     meaning: str
     is_time: bool = False
-    empty: str = "–"
+    empty: str = NOTHING
 
 
 def _text(heading: str, meaning: str, *, is_time: bool = False) -> Column:
@@ -162,7 +167,9 @@ def in_order(names: Iterable[str]) -> list[str]:
 
 def is_missing(value: Any) -> bool:
     """Whether there is no value: None, not a number, or empty text."""
-    return value is None or type(value).__name__ == "NAType" or value == "" or value != value
+    if isinstance(value, (float, np.floating)):
+        return math.isnan(value)
+    return value is None or value is pd.NA or (isinstance(value, str) and not value)
 
 
 def shown(name: str, value: Any) -> str:
@@ -178,7 +185,7 @@ def number_text(value: Any, spec: str = ".3g") -> str:
         return "yes" if value else "no"
     number = float(value)
     if math.isnan(number):
-        return "–"
+        return NOTHING
     if math.isinf(number):
         return "infinite" if number > 0 else "-infinite"
     if number == 0:

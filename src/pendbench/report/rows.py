@@ -15,13 +15,15 @@ Row = Mapping[str, Any]
 
 def records(frame: pd.DataFrame | None) -> list[dict[str, Any]]:
     """The rows of a table; none of a table that is not there."""
-    return [] if frame is None else [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")]
+    if frame is None:
+        return []
+    return [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")]
 
 
 def number(row: Row, name: str) -> float:
     """A number of a row, nan where there is none."""
     value = row.get(name)
-    return math.nan if is_missing(value) or isinstance(value, str) else float(value)
+    return math.nan if value is None or is_missing(value) or isinstance(value, str) else float(value)
 
 
 def word(row: Row, name: str) -> str:

@@ -36,12 +36,19 @@ def rows_table(rows: Iterable[Row], names: Sequence[str]) -> str:
     return table([heading(name) for name in names], [[cell(row, name) for name in names] for row in rows], numbers)
 
 
+def bullets(texts: Iterable[str]) -> str:
+    """Sentences as a list, safe for Markdown."""
+    return "\n".join(f"- {markdown(text, 2000)}" for text in texts)
+
+
 def opening(results: Results) -> list[str]:
     """Title, and that it is the quick variant where it is."""
     parts = [f"# {markdown(results.title)}"]
     if results.quick:
-        parts.append("**This is the quick variant of the study**: fewer scenes, starts or steps, for a first look. Its "
-                     "numbers are measured in the same way as the full study's.")  # fmt: skip
+        parts.append(
+            "**This is the quick variant of the study**: fewer scenes, starts or steps, for a first look. Its numbers are "
+            "measured in the same way as the full study's."
+        )
     return parts
 
 
@@ -87,14 +94,16 @@ def timing_trust(cases: Sequence[Row]) -> str:
         return "Nothing was timed."
     spreads = finite(timed, "step_spread")
     middle, most = shown("step_spread", float(np.median(spreads))), shown("step_spread", max(spreads))
-    parts = [f"{counted(len(timed), 'case')} of {len(cases)} were timed, one at a time. The spread of a step's cost (largest "
-             f"less smallest sample, over the median) is {middle} in the median case and {most} in the worst."]  # fmt: skip
+    parts = [
+        f"{counted(len(timed), 'case')} of {len(cases)} were timed, one at a time. The spread of a step's cost (largest "
+        f"less smallest sample, over the median) is {middle} in the median case and {most} in the worst."
+    ]
     noisy = sorted((row for row in timed if _NOISY in word(row, "flags")), key=lambda row: -number(row, "step_spread"))
     if not noisy:
         return f"{parts[0]} None is marked as noisy."
     parts.append(
-        f"{counted(len(noisy), 'of them is', 'of them are')} noisy: the machine did something else in between. Trust their "
-        "costs to the spread given and no further; run the study again on an idle machine for better ones:"
+        f"{counted(len(noisy), 'of them is', 'of them are')} noisy: the machine did something else in between. Trust "
+        "these costs to the spread given and no further; for better ones run the study again on an idle machine:"
     )
     names = [f"- {markdown(case_name(row))}: spread {cell(row, 'step_spread')}" for row in noisy[:_LISTED]]
     if len(noisy) > _LISTED:
@@ -153,4 +162,6 @@ def files(results: Results) -> str:
     tables = [f"`{name}.csv`" for name in ("cases", *results.tables)]
     clocked = [f"`{name}`" for name, declared in COLUMNS.items() if declared.is_time and name in results.cases]
     text = f"Every number above, to its last digit: {listed(tables)}. What they come from: `provenance.json`."
-    return f"{text} Columns that depend on the clock, and so are not reproduced: {listed(clocked)}." if clocked else text
+    if clocked:
+        text += f" Columns that depend on the clock, and so are not reproduced: {listed(clocked)}."
+    return text

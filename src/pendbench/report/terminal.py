@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
-from pendbench.report.columns import column, shown
+from pendbench.report.columns import NOTHING, column, shown
 from pendbench.report.page import page
 from pendbench.report.rows import Row, is_ok, method_name, number, records, word
 from pendbench.report.text import clipped
@@ -37,15 +38,15 @@ def _cell(row: Row, name: str) -> Text:
         return _plain(", ".join(_short(flag) for flag in word(row, "flags").split("; ") if flag))
     if name == "method":
         return _plain(clipped(method_name(row), _LONGEST))
-    if name.startswith("t_") and number(row, name) != number(row, name):
+    if name.startswith("t_") and math.isnan(number(row, name)):
         missed = number(row, name.removesuffix("_s") + "_not_reached")
-        return _plain(f"> {shown('horizon_s', row.get('horizon_s'))}" if missed > 0 else "–")
+        return _plain(f"> {shown('horizon_s', row.get('horizon_s'))}" if missed > 0 else NOTHING)
     return _plain(clipped(shown(name, row.get(name)), _LONGEST))
 
 
 def _short(flag: str) -> str:
     """A flag without its numbers: what comes before its colon."""
-    return clipped(flag.split(":")[0], _LONGEST)
+    return clipped(flag.partition(":")[0], _LONGEST)
 
 
 def _plain(text: str) -> Text:

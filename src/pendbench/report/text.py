@@ -9,7 +9,7 @@ from typing import Any, Final
 from pendbench.strict import printable
 
 # What a spreadsheet takes for the beginning of a formula, in the widths in which it can be typed.
-_FORMULA: Final = tuple("=+-@\t\r\n|%＝＋－＠")
+_FORMULA: Final = tuple("=+-@|%\uff1d\uff0b\uff0d\uff20")
 _LONGEST: Final = 240
 _LAST_GLYPH: Final = "\u052f"  # Latin, Greek and Cyrillic: what every copy of the plots' font can draw
 

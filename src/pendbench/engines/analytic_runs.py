@@ -1,0 +1,190 @@
+"""The runs of the analytic engine: each holds a state and advances it with one of our solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pendbench.engines.protocol import Fault, State
+from pendbench.physics import canonical
+from pendbench.physics.geometry import positions, velocities
+from pendbench.physics.recursion import system_of
+from pendbench.scene import Scene
+from pendbench.solvers import adaptive, explicit, gauss, rattle, tableaux
+from pendbench.trajectory import FloatArray
+
+
+def _finite(*arrays: FloatArray) -> Fault | None:
+    return None if all(np.all(np.isfinite(array)) for array in arrays) else Fault("not finite", "so is its state")
+
+
+class RungeKutta:
+    """Explicit Runge-Kutta with a fixed step."""
+
+    def __init__(self, scene: Scene, dt: float, method: tableaux.Tableau) -> None:
+        self._system, self._method, self._dt, self._taken = system_of(scene), method, dt, 0
+        self._y = np.concatenate([scene.angles, scene.rates])
+
+    def advance(self, steps: int) -> None:
+        """Take `steps` steps."""
+        explicit.runge_kutta(self._system, self._method, self._taken * self._dt, self._dt, self._y, steps)
+        self._taken += steps
+
+    def state(self) -> State:
+        """The state now."""
+        theta, omega = np.split(self._y, 2)
+        return State(theta.copy(), omega.copy())
+
+    def health(self) -> Fault | None:
+        """Whether it is finite."""
+        return _finite(self._y)
+
+
+class SemiImplicitEuler:
+    """Semi-implicit Euler."""
+
+    def __init__(self, scene: Scene, dt: float) -> None:
+        self._system, self._dt, self._taken = system_of(scene), dt, 0
+        self._q, self._v = scene.angles.copy(), scene.rates.copy()
+
+    def advance(self, steps: int) -> None:
+        """Take `steps` steps."""
+        explicit.semi_implicit_euler(self._system, self._taken * self._dt, self._dt, self._q, self._v, steps)
+        self._taken += steps
+
+    def state(self) -> State:
+        """The state now."""
+        return State(self._q.copy(), self._v.copy())
+
+    def health(self) -> Fault | None:
+        """Whether it is finite."""
+        return _finite(self._q, self._v)
+
+
+class Adaptive:
+    """An embedded pair with error control and compensated summation."""
+
+    def __init__(self, scene: Scene, settings: Mapping[str, Any]) -> None:
+        self._system, self._t = system_of(scene), 0.0
+        self._y, self._carry = np.concatenate([scene.angles, scene.rates]), np.zeros(2 * scene.n)
+        # Angles are measured absolutely: a rod that has turned a thousand times is no less well known.
+        self._relative = np.concatenate([np.zeros(scene.n), np.ones(scene.n)])
+        self._settings, self._left = settings, int(settings["most_steps"])
+        self._h, self._outcome = adaptive.FIRST_STEP, adaptive.DONE
+
+    def advance_to(self, time: float) -> int:
+        """Advance to `time` and return how many steps that took."""
+        progress = adaptive.integrate(
+            self._system,
+            tableaux.DOP853,
+            self._t,
+            time,
+            self._h,
+            self._y,
+            self._carry,
+            self._settings["tolerance"],
+            self._relative,
+            self._settings["smallest_step"],
+            self._left,
+        )
+        taken: int = progress.accepted + progress.rejected
+        self._t, self._h, self._outcome, self._left = progress.t, progress.h, progress.outcome, self._left - taken
+        return taken
+
+    def state(self) -> State:
+        """The state now."""
+        theta, omega = np.split(self._y, 2)
+        return State(theta.copy(), omega.copy())
+
+    def health(self) -> Fault | None:
+        """Whether it is finite and within its limits."""
+        if self._outcome in adaptive.REASONS:
+            status, reason = adaptive.REASONS[self._outcome]
+            return Fault(status, f"{reason} at t = {self._t:.6g} s")
+        return _finite(self._y)
+
+
+class Gauss:
+    """Gauss-Legendre collocation in angles and momenta."""
+
+    def __init__(self, scene: Scene, dt: float, stages: int) -> None:
+        self._system, self._method, self._dt = system_of(scene), gauss.gauss_legendre(stages), dt
+        self._taken, self._stuck = 0, False
+        self._q, self._p = scene.angles.copy(), np.empty(scene.n)
+        self._rates = scene.rates.copy()
+        canonical.write_momenta(self._system, self._q, self._rates, self._p)
+        self._carry, self._slopes = np.zeros((2, scene.n)), np.zeros((2, stages, scene.n))
+        self._slopes[0] = self._rates
+
+    def advance(self, steps: int) -> None:
+        """Take `steps` steps, or as many as converge."""
+        if self._stuck:
+            return
+        t = self._taken * self._dt
+        taken = gauss.collocate(
+            self._system, self._method, t, self._dt, self._q, self._p, self._carry, self._slopes, steps
+        )
+        self._taken += taken
+        self._stuck = taken < steps
+        if steps:
+            canonical.write_rates(self._system, self._q, self._p, self._rates)
+
+    def state(self) -> State:
+        """The state now."""
+        return State(self._q.copy(), self._rates.copy())
+
+    def health(self) -> Fault | None:
+        """Whether it is finite and its stages converged."""
+        if self._stuck:
+            where = f"at t = {self._taken * self._dt:.6g} s"
+            return Fault("not converged", f"the stages of a step did not converge {where}; a smaller step would")
+        return _finite(self._q, self._rates)
+
+
+class Rattle:
+    """RATTLE on the rods' ends."""
+
+    def __init__(self, scene: Scene, dt: float) -> None:
+        gravity = scene.effects.gravity or 0.0
+        self._rods = rattle.Rods(scene.masses.copy(), scene.lengths.copy(), gravity, np.empty((8, scene.n)))
+        self._dt, self._taken, self._stuck = dt, 0, False
+        self._points = positions(scene.lengths, scene.angles)
+        self._speeds = velocities(scene.lengths, scene.angles, scene.rates)
+        self._forces, self._turns = np.zeros(scene.n), np.zeros(scene.n)
+        self._start = State(scene.angles.copy(), scene.rates.copy())
+        self._turns += np.round((scene.angles - self._directions()) / (2 * np.pi))
+
+    def _rods_now(self) -> FloatArray:
+        return np.diff(self._points, axis=0, prepend=np.zeros((1, 2)))
+
+    def _directions(self) -> FloatArray:
+        rods = self._rods_now()
+        return np.arctan2(rods[:, 0], -rods[:, 1])
+
+    def advance(self, steps: int) -> None:
+        """Take `steps` steps, or as many as converge."""
+        if self._stuck:
+            return
+        taken = rattle.rattle(self._rods, self._dt, self._points, self._speeds, self._forces, self._turns, steps)
+        self._taken += taken
+        self._stuck = taken < steps
+
+    def state(self) -> State:
+        """The state now, and how far the worst rod is from its length."""
+        if self._taken == 0:
+            return State(self._start.theta.copy(), self._start.omega.copy())
+        lengths = self._rods.lengths
+        theta = self._directions() + 2 * np.pi * self._turns
+        relative = np.diff(self._speeds, axis=0, prepend=np.zeros((1, 2)))
+        omega = (np.cos(theta) * relative[:, 0] + np.sin(theta) * relative[:, 1]) / lengths
+        gap = np.abs(np.hypot(*self._rods_now().T) / lengths - 1).max()
+        return State(theta, omega, float(gap))
+
+    def health(self) -> Fault | None:
+        """Whether it is finite and its rods could be kept at their lengths."""
+        if self._stuck:
+            where = f"at t = {self._taken * self._dt:.6g} s"
+            return Fault("not converged", f"no forces keep the rods at their lengths {where}; a smaller step would")
+        return _finite(self._points, self._speeds)
