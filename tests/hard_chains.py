@@ -8,7 +8,8 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from pendbench.scene import Effects, FloatArray, Scene
+from pendbench.arrays import FloatArray
+from pendbench.scene import Effects, Scene
 
 GRAVITY = 9.81
 SIZES = (5, 8, 13, 20)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from pendbench.arrays import FloatArray
 from pendbench.physics import dense
-from pendbench.scene import FloatArray, Scene
+from pendbench.scene import Scene
 
 
 def coupling_matrix_as_printed(scene: Scene, theta: FloatArray) -> FloatArray:

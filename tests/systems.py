@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, specialise
-from pendbench.scene import FloatArray
 from pendbench.solvers import extrapolation, problem
 from pendbench.solvers.double_double import scale
 

@@ -133,7 +133,7 @@ def test_numba_s_own_setting_is_left_as_it_was(package):
     before = compiled.config.CACHE_DIR
     kernel = compiled.compiled(lambda x: x + 1)
     compiled._kernels.remove(kernel)
-    assert compiled.config.CACHE_DIR == before
+    assert before == compiled.config.CACHE_DIR
     assert kernel.stats.cache_path.startswith(str(folder()))
     assert package.exists()
 

@@ -9,8 +9,8 @@ from pendbench.engines.protocol import Fault, Method, Setting, State
 from pendbench.engines.registry import engine, engine_names
 from pendbench.errors import InputError
 from pendbench.physics.dense import accelerations
-from pendbench.scene import load_scene
 from pendbench.recording import simulate
+from pendbench.scene import load_scene
 from scenes import chain
 from tampered import Passing, Tampered, honest_build, wrapping
 

@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from pendbench.engines.conformance import check_engine
     from pendbench.errors import InputError
     from pendbench.physics.energy import energy
-    from pendbench.truth import reference
-    from pendbench.scene import Scene, load_scene
     from pendbench.recording import simulate
+    from pendbench.scene import Scene, load_scene
     from pendbench.study.api import run_study
     from pendbench.trajectory import Trajectory
+    from pendbench.truth import reference
 
 _HOMES = {
     "InputError": "pendbench.errors",

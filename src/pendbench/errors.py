@@ -20,3 +20,14 @@ def choose(kind: str, found: object, allowed: Iterable[str]) -> str:
     near = difflib.get_close_matches(str(found), names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
     return f"unknown {kind} {str(found)[:80]!r}; {hint}allowed: {', '.join(names) or 'none'}"
+
+
+def printable(text: str) -> str:
+    """The text on one line: control characters, line ends and lone surrogates are written as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def describe(error: BaseException) -> str:
+    """An exception in one line: its type, and the first line of its message."""
+    lines = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {printable(lines[0][:200])}" if lines else type(error).__name__

@@ -12,13 +12,14 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Method, Setting, Simulation, State
-from pendbench.engines.registry import describe, engine_names, flaw_of
 from pendbench.engines.registry import engine as engine_of
-from pendbench.errors import InputError, choose
+from pendbench.engines.registry import engine_names, flaw_of
+from pendbench.errors import InputError, choose, describe, printable
 from pendbench.scene import Range, Scene, load_scene
-from pendbench.strict import printable, show
-from pendbench.trajectory import STATUSES, FloatArray, Trajectory
+from pendbench.strict import show
+from pendbench.trajectory import STATUSES, Trajectory
 
 #: How many samples a run has, about, where no times are asked for.
 SAMPLES: Final = 1000

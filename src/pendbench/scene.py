@@ -13,10 +13,9 @@ from typing import Annotated, Any, ClassVar, Final, cast
 import numpy as np
 import numpy.typing as npt
 
+from pendbench.arrays import FloatArray
 from pendbench.errors import InputError
 from pendbench.strict import input_error, show
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from pendbench.arrays import FloatArray
 from pendbench.bundled import bundled, bundled_names
-from pendbench.errors import InputError, choose
-from pendbench.scene import ANGLE, DURATION, LENGTH, MASS, MAX_LINKS, RATE, Effects, FloatArray, Scene, disagreement
-from pendbench.strict import input_error, printable, read_toml, show, shown_path, validate
+from pendbench.errors import InputError, choose, printable
+from pendbench.scene import ANGLE, DURATION, LENGTH, MASS, MAX_LINKS, RATE, Effects, Scene, disagreement
+from pendbench.strict import input_error, read_toml, show, shown_path, validate
 
 Mass = Annotated[float, MASS]
 Length = Annotated[float, LENGTH]

@@ -11,7 +11,7 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
 
-from pendbench.errors import InputError, choose
+from pendbench.errors import InputError, choose, printable
 
 if TYPE_CHECKING:
     import pydantic
@@ -54,11 +54,6 @@ _ALLOWED: Final[Mapping[str, str]] = {
     "too_long": "at most {max_length} entries",
     "literal_error": "{expected}",
 }
-
-
-def printable(text: str) -> str:
-    """The text on one line: control characters, line ends and lone surrogates are written as escapes."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shown_path(path: str | os.PathLike[str]) -> str:

@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]
+from pendbench.arrays import FloatArray
 
 #: Every status a run can end with, and what it means. The order is from best to worst.
 STATUSES: Final = {

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pendbench.arrays import FloatArray
 from pendbench.errors import InputError
 from pendbench.scene import Scene
-from pendbench.trajectory import FloatArray, Trajectory
+from pendbench.trajectory import Trajectory
 
 #: The reference ends where its two solves differ by more than this (in units of e: lengths of the chain).
 AGREEMENT = 1e-9

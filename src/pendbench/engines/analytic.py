@@ -39,9 +39,7 @@ class AnalyticEngine:
         """Nothing: every scene is its own."""
         return None
 
-    def build(
-        self, scene: Scene, method: str, dt: float | None, **settings: float
-    ) -> Simulation | AdaptiveSimulation:
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation | AdaptiveSimulation:
         """A run at time 0. Raises ValueError where a method with a fixed step gets none."""
         from pendbench.engines import analytic_runs as runs  # compiles or loads the kernels
         from pendbench.solvers.tableaux import RK4

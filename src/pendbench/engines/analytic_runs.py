@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault, State
 from pendbench.physics import canonical
 from pendbench.physics.geometry import positions, velocities
 from pendbench.physics.recursion import system_of
 from pendbench.scene import Scene
 from pendbench.solvers import adaptive, explicit, gauss, rattle, tableaux
-from pendbench.trajectory import FloatArray
 
 
 def _finite(*arrays: FloatArray) -> Fault | None:

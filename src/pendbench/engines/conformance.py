@@ -15,12 +15,14 @@ from typing import Final
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Simulation, State
-from pendbench.engines.registry import describe, flaw_of
+from pendbench.engines.registry import flaw_of
+from pendbench.errors import describe
 from pendbench.physics.geometry import wrapped
 from pendbench.scene import Effects, Scene
 from pendbench.strict import show
-from pendbench.trajectory import STATUSES, FloatArray
+from pendbench.trajectory import STATUSES
 
 #: How far a measured order of convergence may be from the one that is claimed.
 ORDER_SLACK: Final = 0.2

@@ -19,9 +19,9 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from pendbench.errors import InputError
-from pendbench.scene import FloatArray, Scene
-from pendbench.strict import printable
+from pendbench.arrays import FloatArray
+from pendbench.errors import InputError, printable
+from pendbench.scene import Scene
 
 #: The compiler refuses anything smaller (probed with MuJoCo 4.0.0).
 INERTIA: Final = float(mujoco.mjMINVAL)

@@ -70,10 +70,12 @@ class _Run:
         return Fault("reset", f"its clock says {time:.6g} s after {expected:.6g} s of steps")
 
     def _warned(self) -> Fault | None:
-        for kind, warning in enumerate(self._data.warning):
-            if warning.number:
-                return Fault("warned", f"{mujoco.mju_warningText(kind, warning.lastinfo)} ({warning.number} times)")
-        return None
+        counts = self._data.warning.number
+        if not counts.any():
+            return None
+        kind = int(np.flatnonzero(counts)[0])
+        text = mujoco.mju_warningText(kind, self._data.warning[kind].lastinfo)
+        return Fault("warned", f"{text} ({counts[kind]} times)")
 
 
 class MujocoEngine:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, runtime_checkable
 
+from pendbench.arrays import FloatArray
 from pendbench.scene import Scene
-from pendbench.trajectory import FloatArray
 
 
 class State(NamedTuple):
@@ -41,7 +41,7 @@ class Method:
     """One way an engine advances time.
 
     order: the order of convergence it claims. adaptive: it chooses its own steps and is built with dt None.
- note: one line for the documentation.
+    note: one line for the documentation.
     """
 
     order: int
@@ -95,7 +95,5 @@ class Engine(Protocol):
     def refuses(self, scene: Scene) -> str | None:
         """Why this engine cannot simulate the scene, or None."""
 
-    def build(
-        self, scene: Scene, method: str, dt: float | None, **settings: float
-    ) -> Simulation | AdaptiveSimulation:
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation | AdaptiveSimulation:
         """A run at time 0 in the scene's start. Never timed. `settings` holds only settings the method declares."""

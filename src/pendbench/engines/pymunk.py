@@ -15,8 +15,9 @@ import numpy as np
 import pymunk
 from pymunk import batch
 
+from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault, Method, Setting, Simulation, State
-from pendbench.scene import FloatArray, Scene
+from pendbench.scene import Scene
 
 _MOST_ITERATIONS: Final = 100_000
 

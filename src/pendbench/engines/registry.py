@@ -11,8 +11,8 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final, NamedTuple
 
 from pendbench.engines.protocol import Engine, Method
-from pendbench.errors import InputError, MissingEngineError, choose
-from pendbench.strict import printable, show
+from pendbench.errors import InputError, MissingEngineError, choose, describe, printable
+from pendbench.strict import show
 
 GROUP: Final = "pendbench.engines"
 
@@ -59,12 +59,6 @@ def engine(name: str) -> Engine:
     if made.name != name:
         raise source.missing(f"calls itself {show(made.name)}")
     return made
-
-
-def describe(error: BaseException) -> str:
-    """An exception in one line: its type, and the first line of its message."""
-    lines = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {printable(lines[0][:200])}" if lines else type(error).__name__
 
 
 class _Source(NamedTuple):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, specialise
 from pendbench.physics.system import System
 from pendbench.solvers import problem
-from pendbench.trajectory import FloatArray
 
 
 @compiled

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from pendbench.scene import FloatArray, Scene
+from pendbench.arrays import FloatArray
+from pendbench.scene import Scene
 
 
 def hanging_masses(masses: FloatArray) -> FloatArray:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.physics import dense
 from pendbench.physics.geometry import positions, velocities
-from pendbench.scene import FloatArray, Scene
+from pendbench.scene import Scene
 
 
 def energy(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:

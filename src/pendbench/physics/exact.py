@@ -7,10 +7,11 @@ import math
 import numpy as np
 from scipy.special import ellipj, ellipkm1, elliprf
 
+from pendbench.arrays import FloatArray
 from pendbench.errors import InputError
 from pendbench.physics.dense import hanging_masses
 from pendbench.physics.geometry import TURN
-from pendbench.scene import FloatArray, Scene
+from pendbench.scene import Scene
 
 # scipy's am(u) is off by 2e-9 rad at worst (1 - m near 1e-17); Newton's method then needs three rounds for all digits.
 _NEWTON_ROUNDS = 3

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, specialise
 from pendbench.scene import Scene
 from pendbench.solvers.double_double import add, divide, multiply, scale, sine_cosine, subtract
 from pendbench.solvers.extrapolation import extended_derivative
-from pendbench.trajectory import FloatArray
 
 
 class AngleForm(NamedTuple):
@@ -101,7 +101,7 @@ def _angle_derivative(system: AngleForm, y: FloatArray, dy: FloatArray) -> None:
 
 @compiled
 def _cross_terms(y: FloatArray, i: int, n: int) -> tuple[tuple[float, float], tuple[float, float]]:
-    """cos and sin of theta_{i+1} - theta_i from the sines and cosines of the state."""
+    """Cos and sin of theta_{i+1} - theta_i from the sines and cosines of the state."""
     s, c = (y[i, 0], y[i, 1]), (y[n + i, 0], y[n + i, 1])
     s_next, c_next = (y[i + 1, 0], y[i + 1, 1]), (y[n + i + 1, 0], y[n + i + 1, 1])
     cosine = add(multiply(c_next, c), multiply(s_next, s))
@@ -163,7 +163,7 @@ specialise(extended_derivative, VectorForm, _vector_derivative)
 
 @compiled
 def form_difference(angles: FloatArray, vectors: FloatArray) -> FloatArray:
-    """theta of the vector form's state minus theta of the angle form's, (n,) rad, for differences well below 1."""
+    """Theta of the vector form's state minus theta of the angle form's, (n,) rad, for differences well below 1."""
     n = len(angles) // 2
     out = np.empty(n)
     for i in range(n):

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from pendbench.scene import FloatArray
+from pendbench.arrays import FloatArray
 
 TURN: Final = 2.0 * np.pi
 

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, specialise
 from pendbench.errors import InputError
 from pendbench.physics.system import System
 from pendbench.scene import Scene
 from pendbench.solvers import problem
-from pendbench.trajectory import FloatArray
 
 
 @compiled

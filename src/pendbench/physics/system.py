@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from pendbench.trajectory import FloatArray
+from pendbench.arrays import FloatArray
+
 
 class System(NamedTuple):
     """A chain under gravity or free of it.

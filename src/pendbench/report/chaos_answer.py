@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from pendbench.report.columns import number_text
-from pendbench.report.rows import Row, case_name, distinct, finite, number, of, records, spanned, word
+from pendbench.report.rows import Row, case_name, distinct, finite, number, records, spanned, word
 from pendbench.report.text import counted, listed
 from pendbench.study.results import Results
 
@@ -116,7 +116,9 @@ def _others(ranked: list[_Candidate], best: _Candidate) -> str:
     leaders = [next(candidate for candidate in ranked if candidate.engine == engine) for engine in engines]
     able = [leader for leader in leaders if leader.score > 0]
     if not able:
-        return f"Of the other engines ({listed(list(engines))}) none stayed with the truth for a time that was measured."
+        return (
+            f"Of the other engines ({listed(list(engines))}) none stayed with the truth for a time that was measured."
+        )
     told = [f"the best of the other engines is {able[0].name}, which {_says(able[0])}"]
     told += [f"the best of {leader.engine} is {leader.name}, which {_says(leader)}" for leader in able[1:]]
     failed = [leader.engine for leader in leaders if leader.score <= 0]

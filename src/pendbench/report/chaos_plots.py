@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendbench.report.columns import is_missing, shown
 from pendbench.report.plots import GREY, Colour, Picture, bounds, dashes, draw, hue, logarithmic, panels, shades
 from pendbench.report.rows import Row, distinct, finite, is_ok, method_name, number, of, records, word
-from pendbench.report.text import counted, file_name, label
+from pendbench.report.text import file_name, label
 from pendbench.study.results import Results
 
 if TYPE_CHECKING:
@@ -124,7 +124,9 @@ def _lines(curves: Sequence[Row], column: str, starts: Sequence[Row], until: flo
 
 
 def _key(row: Row) -> tuple[object, ...]:
-    return tuple("" if is_missing(row.get(name)) else row[name] for name in ("scene", "engine", "method", "dt", "settings"))
+    return tuple(
+        "" if is_missing(row.get(name)) else row[name] for name in ("scene", "engine", "method", "dt", "settings")
+    )
 
 
 def _error_picture(name: str, scene: Row, look: Look, lines: list[_Line]) -> Picture:
@@ -177,7 +179,6 @@ def _curves(
     finish: Callable[[Axes], None],
 ) -> Callable[[], Figure]:
     """What makes the figure: a panel for each engine that has a curve."""
-
     lines = [_Line(line.row, line.t, [min(y, limits[1]) for y in line.y], line.ended_badly) for line in lines]
 
     def figure_of() -> Figure:
@@ -285,7 +286,9 @@ def _cost_panel(axes: Axes, look: Look, scene: str, rows: Sequence[Row]) -> None
             _cost_line(axes, look.colour(engine, method), look.marker(engine, method), its)
     missing = [row for row in rows if row not in drawn]
     if missing:
-        counts = {status: sum(word(row, "status") == status for row in missing) for status in distinct(missing, "status")}
+        counts = {
+            status: sum(word(row, "status") == status for row in missing) for status in distinct(missing, "status")
+        }
         text = ", ".join(f"{count} {label(status) or 'without a status'}" for status, count in counts.items())
         axes.annotate(f"not drawn: {text}", (0.02, 0.02), xycoords="axes fraction", fontsize=8, color=GREY)
 

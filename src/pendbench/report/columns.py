@@ -16,7 +16,6 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-
 #: What people read where there is nothing to be read.
 NOTHING: Final = "\u2013"
 

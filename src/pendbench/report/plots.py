@@ -21,7 +21,6 @@ GREY: Final = "0.35"
 
 # Okabe and Ito's colours, which people who confuse red and green tell apart too (jfly.uni-koeln.de/color).
 _HUES: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-_DASHES: Final[tuple[Any, ...]] = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)), (0, (10, 3)))
 
 
 @dataclass(frozen=True)
@@ -63,11 +62,6 @@ def shades(colour: str, count: int) -> list[Colour]:
 def _mixed(base: Colour, other: float, share: float) -> Colour:
     red, green, blue = ((1 - share) * part + share * other for part in base)
     return red, green, blue
-
-
-def dashes(index: int) -> Any:
-    """The stroke of the step with this place among the steps."""
-    return _DASHES[index % len(_DASHES)]
 
 
 def panels(count: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendbench.errors import printable
 from pendbench.report.columns import NOTHING, column, shown
 from pendbench.report.page import page
 from pendbench.report.rows import Row, is_ok, method_name, number, records, word
 from pendbench.report.text import clipped
-from pendbench.strict import printable
 from pendbench.study.results import Results
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
-from pendbench.strict import printable
+from pendbench.errors import printable
 
 # What a spreadsheet takes for the beginning of a formula, in the widths in which it can be typed.
 _FORMULA: Final = tuple("=+-@|%\uff1d\uff0b\uff0d\uff20")

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
 from pendbench.solvers.explicit import stage_state
 from pendbench.solvers.problem import derivative
 from pendbench.solvers.tableaux import EmbeddedPair
-from pendbench.trajectory import FloatArray
 
 DONE, TOO_SMALL, TOO_MANY, NOT_FINITE = 0, 1, 2, 3
 

@@ -15,8 +15,8 @@ import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
-from pendbench.trajectory import FloatArray
 
 Number = tuple[float, float]
 
@@ -39,7 +39,7 @@ def split(exact: Fraction, parts: int = 2) -> tuple[float, ...]:
 
 
 def _series(x: Fraction, first: int) -> Fraction:
-    """sin x (first = 1) or cos x (first = 0) to 40 digits, for |x| up to 2 pi."""
+    """Sin x (first = 1) or cos x (first = 0) to 40 digits, for |x| up to 2 pi."""
     return sum(
         (Fraction((-1) ** j) * x ** (2 * j + first) / math.factorial(2 * j + first) for j in range(32)), Fraction(0)
     )
@@ -96,7 +96,7 @@ def _two_product(a: float, b: float) -> Number:
 
 @compiled
 def add(a: Number, b: Number) -> Number:
-    """a + b."""
+    """A + b."""
     s, e = _two_sum(a[0], b[0])
     t, f = _two_sum(a[1], b[1])
     s, e = _fast_two_sum(s, e + t)
@@ -105,27 +105,27 @@ def add(a: Number, b: Number) -> Number:
 
 @compiled
 def subtract(a: Number, b: Number) -> Number:
-    """a - b."""
+    """A - b."""
     return add(a, (-b[0], -b[1]))
 
 
 @compiled
 def multiply(a: Number, b: Number) -> Number:
-    """a b."""
+    """A b."""
     p, e = _two_product(a[0], b[0])
     return _fast_two_sum(p, e + (a[0] * b[1] + a[1] * b[0]))
 
 
 @compiled
 def scale(a: Number, b: float) -> Number:
-    """a b, where b is one double."""
+    """A b, where b is one double."""
     p, e = _two_product(a[0], b)
     return _fast_two_sum(p, e + a[1] * b)
 
 
 @compiled
 def divide(a: Number, b: Number) -> Number:
-    """a / b, by long division."""
+    """A / b, by long division."""
     q1 = a[0] / b[0]
     rest = subtract(a, scale(b, q1))
     q2 = rest[0] / b[0]
@@ -143,7 +143,7 @@ def _polynomial(coefficients: FloatArray, x: Number) -> Number:
 
 @compiled
 def sine_cosine(a: Number) -> tuple[Number, Number]:
-    """sin a and cos a, for |a| up to 1e9."""
+    """Sin a and cos a, for |a| up to 1e9."""
     multiple = np.rint(a[0] * _PER_STEP)
     rest = subtract(a, _two_product(multiple, _STEP_1))
     rest = subtract(rest, _two_product(multiple, _STEP_2))

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
 from pendbench.solvers.problem import acceleration, derivative
 from pendbench.solvers.tableaux import Tableau
-from pendbench.trajectory import FloatArray
 
 
 @compiled

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
 from pendbench.solvers.adaptive import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL, Progress
 from pendbench.solvers.double_double import Number, add, divide, multiply, split, subtract
-from pendbench.trajectory import FloatArray
 
 
 def extended_derivative(system: Any, y: FloatArray, dy: FloatArray) -> None:
@@ -34,7 +34,7 @@ def neville_weights(columns: int) -> FloatArray:
 
 @compiled
 def _axpy(out: FloatArray, y: FloatArray, h: Number, dy: FloatArray) -> None:
-    """out = y + h dy."""
+    """Out = y + h dy."""
     for i in range(len(y)):
         change = multiply((dy[i, 0], dy[i, 1]), h)
         out[i, 0], out[i, 1] = add((y[i, 0], y[i, 1]), change)

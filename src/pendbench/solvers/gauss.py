@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
 from pendbench.solvers.problem import generalized_force, velocity
-from pendbench.trajectory import FloatArray
 
 _MOST_ITERATIONS = 60
 
@@ -48,7 +48,7 @@ def gauss_legendre(stages: int) -> Collocation:
 
 @compiled
 def _combine(weights: FloatArray, h: float, start: FloatArray, slopes: FloatArray, out: FloatArray) -> None:
-    """out = start + h sum_j weights[j] slopes[j]."""
+    """Out = start + h sum_j weights[j] slopes[j]."""
     for i in range(len(start)):
         total = 0.0
         for j in range(len(weights)):
@@ -58,7 +58,7 @@ def _combine(weights: FloatArray, h: float, start: FloatArray, slopes: FloatArra
 
 @compiled
 def _add(weights: FloatArray, h: float, slopes: FloatArray, y: FloatArray, carry: FloatArray) -> None:
-    """y += h sum_j weights[j] slopes[j], with the rounding errors kept in `carry`."""
+    """Y += h sum_j weights[j] slopes[j], with the rounding errors kept in `carry`."""
     for i in range(len(y)):
         total = 0.0
         for j in range(len(weights)):

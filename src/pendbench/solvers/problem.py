@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pendbench.trajectory import FloatArray
+from pendbench.arrays import FloatArray
 
 
 def derivative(system: Any, t: float, y: FloatArray, dy: FloatArray) -> None:

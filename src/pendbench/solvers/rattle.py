@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
-from pendbench.trajectory import FloatArray
 
 _MOST_ITERATIONS = 50
 

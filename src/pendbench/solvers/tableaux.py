@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import DOP853 as _SCIPY_DOP853
 
-from pendbench.trajectory import FloatArray
+from pendbench.arrays import FloatArray
 
 
 class Tableau(NamedTuple):

@@ -40,7 +40,7 @@ def write_baseline(path: Path, cases: pd.DataFrame) -> None:
 def read_baseline(path: Path) -> pd.DataFrame:
     """A baseline from its file. Raises `InputError`, one line, where it is missing or is none."""
     try:
-        table = pd.read_csv(path, keep_default_na=True, dtype={name: str for name in ("settings", "scene", "status")})
+        table = pd.read_csv(path, keep_default_na=True, dtype=dict.fromkeys(("settings", "scene", "status"), str))
     except FileNotFoundError:
         raise InputError(f"{shown_path(path)}: no baseline to check against; --update-baseline writes one") from None
     except (OSError, ValueError) as error:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Engine, Simulation
 from pendbench.physics.recursion import accelerations
 from pendbench.scene import Scene
-from pendbench.trajectory import FloatArray
 
 _STATES = 4
 _STEPS = 32  # an iterative solver that starts from its last answer needs some steps to settle
@@ -43,7 +44,7 @@ def _limit(values: list[FloatArray]) -> tuple[FloatArray, float]:
     columns = values
     best, change = values[-1], math.inf
     for k in range(1, len(values)):
-        columns = [b + (b - a) / (2**k - 1) for a, b in zip(columns, columns[1:], strict=False)]
+        columns = [b + (b - a) / (2**k - 1) for a, b in itertools.pairwise(columns)]
         step = float(np.abs(columns[-1] - best).max())
         # Further columns take more truncation away and bring more rounding in: stop where they begin to hurt.
         if step > change:

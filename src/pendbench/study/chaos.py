@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault
 from pendbench.engines.registry import engine
 from pendbench.scene import Scene
@@ -36,7 +37,7 @@ from pendbench.study.work import (
     measure_timing,
     measure_truth,
 )
-from pendbench.trajectory import STATUSES, FloatArray
+from pendbench.trajectory import STATUSES
 
 Record = dict[str, Any]
 
@@ -46,7 +47,8 @@ _ERROR_CEILING: Final = 0.03  # above it an error is no longer small, and says n
 
 class Options(StudyFile):
     """starts: how many perturbed starts beside the scene's own; perturbation: their angles' standard deviation, rad;
-    sample: s between the times that are compared; order_time: s at which orders are fitted; lyapunov_time: s."""
+    sample: s between the times that are compared; order_time: s at which orders are fitted; lyapunov_time: s.
+    """
 
     starts: Annotated[int, Field(ge=0, le=10_000)] = 8
     perturbation: Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)] = 0.01

@@ -1,4 +1,4 @@
-"""What a reader should be told about a row: another system, a wrong order, a plateau, a result too good, a bad timing."""
+"""What a reader should be told about a row: another system, a wrong order, a plateau, too good a result, bad timing."""
 
 from __future__ import annotations
 

@@ -15,8 +15,7 @@ from types import TracebackType
 from typing import Any, Protocol, Self
 
 from pendbench.engines.protocol import Fault
-from pendbench.engines.registry import describe
-from pendbench.errors import InputError
+from pendbench.errors import InputError, describe
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,8 @@ class LocalPool:
 
     def run(self, jobs: Iterable[Job], *, alone: bool = False) -> Iterator[Outcome]:
         """The outcome of each job, in the order in which they finish."""
-        queue, running = iter(jobs), {}
+        queue = iter(jobs)
+        running: dict[Any, Job] = {}
         room = 1 if alone else 2 * self.workers
         while True:
             for job in itertools.islice(queue, room - len(running)):

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.engines.analytic import AnalyticEngine
 from pendbench.engines.protocol import AdaptiveSimulation
 from pendbench.scene import Scene
-from pendbench.trajectory import FloatArray
 
 _APART = 1e-7  # rad: small enough to stay linear, large enough above the solver's own errors
 _BLOCKS = 10

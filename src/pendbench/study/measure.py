@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendbench.trajectory import FloatArray
+from pendbench.arrays import FloatArray
 
 
 class Crossing(NamedTuple):
@@ -19,7 +19,8 @@ class Crossing(NamedTuple):
 
 class Drift(NamedTuple):
     """How an energy strays, in units of the energy scale: largest and last deviation from the first value, the band
-    (peak to peak) and the slope of a least-squares line, per second."""
+    (peak to peak) and the slope of a least-squares line, per second.
+    """
 
     largest: float
     final: float

@@ -16,10 +16,10 @@ from pydantic import AfterValidator, ConfigDict, Field
 from pendbench.bundled import bundled, bundled_names
 from pendbench.engines.protocol import Engine, Method
 from pendbench.engines.registry import engine
-from pendbench.errors import InputError, choose
+from pendbench.errors import InputError, choose, printable
 from pendbench.scene import Scene, load_scene
 from pendbench.scene_file import Table
-from pendbench.strict import input_error, printable, read_toml, show, shown_path, validate
+from pendbench.strict import input_error, read_toml, show, shown_path, validate
 from pendbench.study.case import Case
 from pendbench.study.kinds import KINDS, kind
 
@@ -150,11 +150,11 @@ def _variants(where: str, table: EngineTable, its: Engine) -> Iterator[Variant]:
         if not steps:
             raise input_error(where, f"missing key 'dt': method {name!r} needs a list of steps, s")
         lists = [_values(where, key, settings[key], method) for key in sorted(method.settings) if key in settings]
-        for dt, *chosen in itertools.product(steps, *lists):
-            yield name, dt, tuple(chosen)
+        for dt, chosen in itertools.product(steps, itertools.product(*lists)):
+            yield name, dt, chosen
 
 
-def _values(where: str, key: str, values: object, method: Method) -> list[tuple[str, float]]:
+def _values(where: str, key: str, values: Any, method: Method) -> list[tuple[str, float]]:
     setting = method.settings[key]
     whole = " whole" if setting.integer else ""
     allowed = f"a{whole} number, or a list of them, from {setting.low:g} to {setting.high:g}"

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.files import write_whole
-from pendbench.trajectory import FloatArray
 
 
 @cache

@@ -7,20 +7,21 @@ from typing import Any, Final
 
 import numpy as np
 
+from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault
 from pendbench.engines.registry import engine
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance, wrapped
-from pendbench.truth import Truth, reference, solve_angles, solve_vectors
-from pendbench.scene import Scene
 from pendbench.recording import simulate
+from pendbench.scene import Scene
 from pendbench.study.case import Case
 from pendbench.study.causes import model_error
 from pendbench.study.clock import time_case
 from pendbench.study.lyapunov import lyapunov_exponent
 from pendbench.study.measure import drift, growth_rate, time_to
 from pendbench.study.store import Store
-from pendbench.trajectory import FloatArray, Trajectory
+from pendbench.trajectory import Trajectory
+from pendbench.truth import Truth, reference, solve_angles, solve_vectors
 
 Record = dict[str, Any]
 
@@ -67,7 +68,9 @@ def _growth_of_neighbours(scene: Scene, truth: Truth) -> float:
     """The rate, 1/s, at which a start 1e-10 rad away leaves the truth: what chaos does to any small error here."""
     neighbour = simulate(scene.with_start(scene.angles + _APART, scene.rates), times=truth.t)
     offset = truth.offset(neighbour.theta)
-    return growth_rate(truth.t[: len(offset)], distance(scene.lengths, truth.theta[: len(offset)], offset), _GROWTH_FROM, _GROWTH_TO)
+    return growth_rate(
+        truth.t[: len(offset)], distance(scene.lengths, truth.theta[: len(offset)], offset), _GROWTH_FROM, _GROWTH_TO
+    )
 
 
 def measure_exponent(scene: Scene, seconds: float) -> Record:
@@ -133,7 +136,7 @@ def failed_run(fault: Fault) -> Record:
 
 
 def _errors(scene: Scene, run: Trajectory, truth: dict[str, FloatArray], at: Any) -> tuple[FloatArray, FloatArray]:
-    """e and the largest wrapped angle error at each compared time that the run reached."""
+    """E and the largest wrapped angle error at each compared time that the run reached."""
     at = at[: len(run.t)]
     offset = (run.theta[: len(at)] - truth["theta"][at]) - truth["theta_low"][at]
     angle = np.abs(wrapped(offset)).max(axis=1, initial=0.0)
@@ -164,7 +167,7 @@ def _energies(scene: Scene, run: Trajectory, horizon: float) -> Record:
 def _curve(scene: Scene, run: Trajectory, error: FloatArray) -> list[list[float | None]]:
     """t, e and the energy's error of some of the samples; e is None past the horizon."""
     k = len(run.t)
-    chosen = np.unique(np.linspace(0, k - 1, min(k, _CURVE_POINTS)).astype(int)) if k else []
+    chosen = np.unique(np.linspace(0, max(k - 1, 0), min(k, _CURVE_POINTS)).astype(int))
     with np.errstate(over="ignore"):
         values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
     strays = (values - values[:1]) / scale if scale else values * 0
