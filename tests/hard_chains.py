@@ -8,7 +8,6 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from pendbench.arrays import FloatArray
 from pendbench.scene import Effects, Scene
 
 GRAVITY = 9.81
@@ -17,15 +16,15 @@ SIZES = (5, 8, 13, 20)
 Maker = Callable[[np.random.Generator, int], tuple[Any, Any, Any]]
 
 
-def _anyhow(rng: np.random.Generator, n: int) -> FloatArray:
+def _anyhow(rng: np.random.Generator, n: int) -> np.ndarray:
     return rng.uniform(-np.pi, np.pi, n)
 
 
-def _alike(rng: np.random.Generator, n: int) -> FloatArray:
+def _alike(rng: np.random.Generator, n: int) -> np.ndarray:
     return rng.uniform(0.5, 2.0, n)
 
 
-def _nearly_straight(rng: np.random.Generator, n: int) -> FloatArray:
+def _nearly_straight(rng: np.random.Generator, n: int) -> np.ndarray:
     return rng.uniform(-np.pi, np.pi) + 1e-4 * rng.standard_normal(n)
 
 
@@ -73,7 +72,7 @@ def exact_accelerations(scene: Scene, digits: int = 50) -> list[mpmath.mpf]:
         return list(mpmath.lu_solve(left, right))
 
 
-def relative_error(found: FloatArray, exact: list[mpmath.mpf]) -> float:
+def relative_error(found: np.ndarray, exact: list[mpmath.mpf]) -> float:
     """The largest error of a component over the largest component."""
     with mpmath.workdps(50):
         worst = max(abs(mpmath.mpf(float(f)) - e) for f, e in zip(found, exact, strict=True))

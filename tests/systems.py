@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, specialise
 from pendbench.solvers import extrapolation, problem
 from pendbench.solvers.double_double import scale
@@ -18,7 +17,7 @@ class Oscillator(NamedTuple):
 
     frequency: float
 
-    def exact(self, start: FloatArray, t: float) -> FloatArray:
+    def exact(self, start: np.ndarray, t: float) -> np.ndarray:
         """The state (2,) at time t."""
         (q, v), w = start, self.frequency
         c, s = math.cos(w * t), math.sin(w * t)
@@ -34,24 +33,24 @@ class Growth(NamedTuple):
 
 
 @compiled
-def _oscillate(system: Oscillator, t: float, y: FloatArray, dy: FloatArray) -> None:  # noqa: ARG001
+def _oscillate(system: Oscillator, t: float, y: np.ndarray, dy: np.ndarray) -> None:  # noqa: ARG001
     dy[0] = y[1]
     dy[1] = -(system.frequency**2) * y[0]
 
 
 @compiled
-def _pull(system: Oscillator, t: float, q: FloatArray, v: FloatArray, a: FloatArray) -> None:  # noqa: ARG001
+def _pull(system: Oscillator, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:  # noqa: ARG001
     a[0] = -(system.frequency**2) * q[0]
 
 
 @compiled
-def _oscillate_extended(system: Oscillator, y: FloatArray, dy: FloatArray) -> None:
+def _oscillate_extended(system: Oscillator, y: np.ndarray, dy: np.ndarray) -> None:
     dy[0, 0], dy[0, 1] = y[1, 0], y[1, 1]
     dy[1, 0], dy[1, 1] = scale(scale((y[0, 0], y[0, 1]), -system.frequency), system.frequency)
 
 
 @compiled
-def _grow(system: Growth, t: float, y: FloatArray, dy: FloatArray) -> None:
+def _grow(system: Growth, t: float, y: np.ndarray, dy: np.ndarray) -> None:
     dy[0] = system.rate * y[0] ** system.power + system.drive * math.cos(t)
 
 
@@ -61,6 +60,6 @@ specialise(extrapolation.extended_derivative, Oscillator, _oscillate_extended)
 specialise(problem.derivative, Growth, _grow)
 
 
-def order(steps: FloatArray, errors: FloatArray) -> float:
+def order(steps: np.ndarray, errors: np.ndarray) -> float:
     """The slope of log error over log step."""
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])

@@ -28,7 +28,7 @@ _PACKAGE = Path(__file__).resolve().parent
 _KERNEL_SOURCES = ("compiled.py", "physics/*.py", "solvers/*.py")
 
 #: Division by zero gives inf or nan, as in numpy: a test before each division would cost time and catch nothing.
-_OPTIONS: Any = {"error_model": "numpy"}
+_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}}
 
 _kernels: list[Any] = []
 _sources_outside: list[Path] = []
@@ -75,7 +75,16 @@ def _keep_on_disk(kernel: Any) -> None:
 
 def compiled(function: Kernel) -> Kernel:
     """Compile `function` when it is first called, and keep the machine code on disk."""
-    kernel: Kernel = numba.njit(**_OPTIONS)(function)
+    return _compiled(function, inline=False)
+
+
+def inlined(function: Kernel) -> Kernel:
+    """The same for a small kernel that is made part of whatever calls it: passing arrays costs as much as it does."""
+    return _compiled(function, inline=True)
+
+
+def _compiled(function: Kernel, *, inline: bool) -> Kernel:
+    kernel: Kernel = numba.njit(forceinline=inline, **_OPTIONS)(function)
     _keep_on_disk(kernel)
     _kernels.append(kernel)
     return kernel
@@ -97,7 +106,7 @@ def specialise(generic: Callable[..., None], system: type, kernel: Callable[...,
 
         return call
 
-    overload(generic, jit_options=_OPTIONS, strict=False)(choose)
+    overload(generic, jit_options={**_OPTIONS, "forceinline": True}, strict=False)(choose)
 
 
 def _know_source(source: Path) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled, specialise
+from pendbench.compiled import inlined, specialise
 from pendbench.physics.system import System
 from pendbench.solvers import problem
 
 
-@compiled
+@inlined
 def write_momenta(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
     """Write p = C(theta) omega (n,) kg m^2/s into `out`: the momentum of the masses outside each rod, across it."""
     masses, lengths = system.masses, system.lengths
@@ -28,7 +28,7 @@ def write_momenta(system: System, theta: FloatArray, omega: FloatArray, out: Flo
         out[i] = lengths[i] * (math.cos(theta[i]) * x + math.sin(theta[i]) * y)
 
 
-@compiled
+@inlined
 def write_forces(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
     """Write dL/dtheta (n,) N m into `out`: minus the outer momentum along each moving rod, and the weight's torque."""
     masses, lengths = system.masses, system.lengths
@@ -48,7 +48,7 @@ def write_forces(system: System, theta: FloatArray, omega: FloatArray, out: Floa
         out[i] = -lengths[i] * (omega[i] * (s * x - c * y) + hanging * system.gravity * s)
 
 
-@compiled
+@inlined
 def write_rates(system: System, theta: FloatArray, momenta: FloatArray, out: FloatArray) -> None:
     """Write omega = C(theta)^-1 p (n,) rad/s into `out`.
 
@@ -82,7 +82,7 @@ def write_rates(system: System, theta: FloatArray, momenta: FloatArray, out: Flo
         radial, transverse = c * radial + s * q, c * q - s * radial
 
 
-@compiled
+@inlined
 def _write_force(system: System, t: float, q: FloatArray, v: FloatArray, f: FloatArray) -> None:  # noqa: ARG001
     write_forces(system, q, v, f)
 

@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled, specialise
+from pendbench.compiled import inlined, specialise
 from pendbench.errors import InputError
 from pendbench.physics.system import System
+from pendbench.physics.trigonometry import direction, write_bends
 from pendbench.scene import Scene
 from pendbench.solvers import problem
 
 
-@compiled
-def _bend(inner: float, outer: float) -> tuple[float, float]:
-    """Cosine and sine of outer - inner.
-
-    Next to a heavy mass a small bend decides everything, so what rounding takes from the difference is put back (Knuth,
-    The Art of Computer Programming 2, 4.2.2, theorem B): without it, alternating masses of 1 and 1e8 lose two digits.
-    """
-    bend = outer - inner
-    kept = bend - outer
-    lost = (outer - (bend - kept)) - (inner + kept)
-    c, s = math.cos(bend), math.sin(bend)
-    return c - s * lost, s + c * lost
+# The rows of a system's scratch. Outwards, each link's tension takes the place of the cosine it no longer needs.
+_OWN, _PASSED, _ACROSS, _COSINE = range(4)
+_TENSION = _COSINE
 
 
-@compiled
+@inlined
 def inwards(system: System, theta: FloatArray, omega: FloatArray) -> tuple[float, float]:
     """Eliminate the chain from the tip to the pivot.
 
@@ -38,57 +28,58 @@ def inwards(system: System, theta: FloatArray, omega: FloatArray) -> tuple[float
     i across rod i. Returns (alpha_1, beta_1), with which the tension in the first rod is `beta - alpha u.a'`.
     """
     masses, lengths = system.masses, system.lengths
-    own, passed, across = system.scratch[0], system.scratch[1], system.scratch[2]
+    scratch = system.scratch
+    write_bends(theta, scratch, _COSINE, _ACROSS)
     tip = len(masses) - 1
-    own[tip], passed[tip], across[tip] = 0.0, 0.0, 0.0
+    scratch[_OWN, tip], scratch[_PASSED, tip], scratch[_ACROSS, tip] = 0.0, 0.0, 0.0
     alpha = masses[tip]
     beta = alpha * lengths[tip] * omega[tip] ** 2
     for i in range(tip - 1, -1, -1):
         m = masses[i]
-        c, s = _bend(theta[i], theta[i + 1])
+        c, s = scratch[_COSINE, i], scratch[_ACROSS, i]
         loose = 1.0 / (m + alpha)
         held = m / (m + alpha * s * s)
-        own[i] = m * beta * loose
-        passed[i] = alpha * c * loose
-        across[i] = s / m
+        scratch[_OWN, i] = m * beta * loose
+        scratch[_PASSED, i] = alpha * c * loose
+        scratch[_ACROSS, i] = s / m
         beta *= c * held
         alpha = held * (m + alpha)
         beta += alpha * lengths[i] * omega[i] ** 2
     return alpha, beta
 
 
-@compiled
+@inlined
 def outwards(system: System, theta: FloatArray, alpha: float, beta: float, out: FloatArray) -> None:
     """Carry the first rod's tension to the tip; write theta'' (n,) into `out`, and leave T (n,) in `system.scratch[3]`.
 
     Takes what `inwards` returned and left behind. Tensions, not accelerations, are carried: each is a mean of two with
     positive weights (but for the cosine), so a light mass between heavy ones costs no digits.
     """
-    lengths = system.lengths
-    own, passed, across, tensions = system.scratch[0], system.scratch[1], system.scratch[2], system.scratch[3]
-    tension = beta + alpha * system.gravity * math.cos(theta[0])
-    start = system.gravity * math.sin(theta[0])  # how the inner end of the rod accelerates across it
+    lengths, scratch = system.lengths, system.scratch
+    c, s = direction(theta[0])
+    tension = beta + alpha * system.gravity * c
+    start = system.gravity * s  # how the inner end of the rod accelerates across it
     for i in range(len(lengths)):
-        tensions[i] = tension
-        following = own[i] + passed[i] * tension
-        out[i] = (across[i] * following - start) / lengths[i]
-        start = across[i] * tension
+        scratch[_TENSION, i] = tension
+        following = scratch[_OWN, i] + scratch[_PASSED, i] * tension
+        out[i] = (scratch[_ACROSS, i] * following - start) / lengths[i]
+        start = scratch[_ACROSS, i] * tension
         tension = following
 
 
-@compiled
+@inlined
 def write_accelerations(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
     """Write theta'' (n,) rad/s^2 at theta (n,) rad, omega (n,) rad/s into `out`."""
     alpha, beta = inwards(system, theta, omega)
     outwards(system, theta, alpha, beta, out)
 
 
-@compiled
+@inlined
 def _write_acceleration(system: System, t: float, q: FloatArray, v: FloatArray, a: FloatArray) -> None:  # noqa: ARG001
     write_accelerations(system, q, v, a)
 
 
-@compiled
+@inlined
 def _write_derivative(system: System, t: float, y: FloatArray, dy: FloatArray) -> None:  # noqa: ARG001
     n = len(system.masses)
     dy[:n] = y[n:]

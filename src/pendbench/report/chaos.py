@@ -57,7 +57,7 @@ def markdown_page(results: Results, plots: Sequence[Picture]) -> str:
         sections.failures(cases, scenes),
         "## How it was measured",
         method(results.options),
-        sections.definitions([*results.cases, *(name for frame in results.tables.values() for name in frame)]),
+        sections.definitions(str(name) for frame in (results.cases, *results.tables.values()) for name in frame),
         "## How far to trust the timings",
         sections.timing_trust(cases),
         *_costs_of_failures(cases),
@@ -95,29 +95,30 @@ def _causes(causes: Sequence[Row], cases: Sequence[Row], scenes: Sequence[Row]) 
     yield _PARTS
     if causes:
         names = ["scene", "engine", "method", "model_error", "model_error_limit", "order_claimed", "order_observed",
-                 "plateau", "growth_per_s", "lyapunov_per_s", "cause"]  # fmt: skip
+                 "plateau", "growth_per_s", "neighbours_growth_per_s", "cause"]  # fmt: skip
         by_scene = [row for scene in distinct(causes, "scene") for row in in_order(of(causes, scene=scene))]
         yield sections.rows_table([_cause(row) for row in by_scene], names)
     yield "What that says about each engine:"
     yield sections.bullets(engine_sentences(causes, cases))
-    yield from (_same(group) for group in twins(cases))
+    yield from _same(twins(cases))
     yield "What the growth of errors says about each scene:"
     yield sections.bullets(growth_sentences(scenes, cases))
     yield _LIMIT
 
 
-def _same(group: Sequence[str]) -> str:
-    names = listed([markdown(name) for name in group])
-    return (
-        f"The same errors, to 0.1 % in every case that can be compared, come from {names}: the same method on the same "
-        "system, and what differs between them is the cost."
-    )
+def _same(groups: Sequence[Sequence[str]]) -> Iterator[str]:
+    if groups:
+        yield (
+            "These give the same errors, to 0.1 % in every case that can be compared: they are the same method on the "
+            "same system, and what differs between them is the cost."
+        )
+        yield sections.bullets(listed(group) for group in groups)
 
 
 def _cause(row: Row) -> dict[str, Any]:
     """A row of causes as people read it."""
     nothing = all(is_missing(row.get(name)) for name in ("model_error", "order_observed", "growth_per_s"))
-    exponent, order = row.get("lyapunov_per_s"), shown("order_observed", row.get("order_observed"))
+    order = shown("order_observed", row.get("order_observed"))
     seen = not is_missing(row.get("order_observed"))
     steps = [shown(name, row.get(name)) for name in ("order_dt_coarse", "order_dt_fine")]
     return {
@@ -125,9 +126,13 @@ def _cause(row: Row) -> dict[str, Any]:
         "method": method_name(row),
         "order_observed": f"{order} ({steps[0]} to {steps[1]} s)" if seen else NOTHING,
         "plateau": row.get("plateau") if seen else NOTHING,
-        "lyapunov_per_s": "regular motion" if is_missing(exponent) else exponent,
+        "neighbours_growth_per_s": _neighbour(row),
         "cause": "not known: nothing could be measured" if nothing else word(row, "cause"),
     }
+
+
+def _neighbour(row: Row) -> Any:
+    return "regular motion" if is_missing(row.get("lyapunov_per_s")) else row.get("neighbours_growth_per_s")
 
 
 def _cost(plots: Sequence[Picture]) -> Iterator[str]:

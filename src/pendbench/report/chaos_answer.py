@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from pendbench.report.columns import number_text
-from pendbench.report.rows import Row, case_name, distinct, finite, number, records, spanned, word
+from pendbench.report.rows import Row, case_name, distinct, finite, is_noisy, number, records, spanned, word
 from pendbench.report.text import counted, listed
 from pendbench.study.results import Results
 
@@ -18,9 +18,9 @@ _NOT_REACHED: Final = "t_1e-2_not_reached"
 
 @dataclass(frozen=True)
 class _Stay:
-    """How long one case stays with the truth. share: of the horizon, 1 where it does not leave before, 0 where it failed.
+    """How long one case stays with the truth.
 
-    time: s, nan where it does not leave before the horizon or failed.
+    share: of the horizon, 1 where it does not leave before, 0 where it failed. time: s, nan in both these cases.
     """
 
     row: Row
@@ -62,7 +62,10 @@ def answer(results: Results) -> str:
         )
     best = ranked[0]
     where = f"in the {kind} scene {scenes[0]}" if len(scenes) == 1 else f"in the {len(scenes)} {kind} scenes"
-    first = f"{where[0].upper()}{where[1:]} {best.name} stays with the truth longest, until e = 1e-2: it {_says(best)}."
+    equals = {one.engine: one.name for one in reversed(ranked) if one.score == best.score and one.engine != best.engine}
+    shared = f" (and {listed(sorted(equals.values()))} as long)" if equals else ""
+    where = f"{where[0].upper()}{where[1:]}"
+    first = f"{where} {best.name} stays with the truth longest{shared}, until e = 1e-2: it {_says(best)}."
     return f"{first} {_others(ranked, best)}"
 
 
@@ -116,14 +119,12 @@ def _others(ranked: list[_Candidate], best: _Candidate) -> str:
     leaders = [next(candidate for candidate in ranked if candidate.engine == engine) for engine in engines]
     able = [leader for leader in leaders if leader.score > 0]
     if not able:
-        return (
-            f"Of the other engines ({listed(list(engines))}) none stayed with the truth for a time that was measured."
-        )
+        return f"Of the other engines ({listed(list(engines))}) none stayed for a time that could be measured."
     told = [f"the best of the other engines is {able[0].name}, which {_says(able[0])}"]
     told += [f"the best of {leader.engine} is {leader.name}, which {_says(leader)}" for leader in able[1:]]
     failed = [leader.engine for leader in leaders if leader.score <= 0]
     if failed:
-        told.append(f"{listed(failed)} did not stay for a time that was measured")
+        told.append(f"{listed(failed)} did not stay for a time that could be measured")
     sentence = "; ".join(told)
     return f"{sentence[0].upper()}{sentence[1:]}."
 
@@ -153,7 +154,8 @@ def _price(candidate: _Candidate) -> str:
     if not costs:
         return "at a cost that was not measured"
     low, high = number_text(costs[0], ".2g"), number_text(costs[-1], ".2g")
-    return f"for {low if low == high else f'{low} to {high}'} ms of computing per simulated second"
+    noise = " (noisy timings)" if any(is_noisy(stay.row) for stay in candidate.stays) else ""
+    return f"for {low if low == high else f'{low} to {high}'} ms of computing per simulated second{noise}"
 
 
 def _percents(shares: Sequence[float]) -> str:

@@ -9,11 +9,12 @@ from typing import Final
 
 from pendbench.report.columns import number_text, shown
 from pendbench.report.rows import Row, distinct, finite, method_name, number, of, spanned, word
-from pendbench.report.text import counted, listed
+from pendbench.report.text import listed
 
 #: Errors that agree to this share of themselves, at every step and in every scene, come from the same method.
 _SAME: Final = 1e-3
 _ROUNDING: Final = 1e-6  # smaller errors hold a share of rounding, amplified by chaos, that matters at `_SAME`
+_NEAR: Final = 1.5  # how near a fitted rate is to be: rates over a few Lyapunov times are rough
 _LONG: Final = 5.0  # Lyapunov times for which an error must have grown before its rate speaks of chaos
 
 
@@ -65,31 +66,32 @@ def _plateaus(causes: Sequence[Row]) -> Iterator[str]:
 def growth_sentences(scenes: Sequence[Row], cases: Sequence[Row]) -> Iterator[str]:
     """What the growth of errors says about each scene: chaos, or regular motion."""
     for scene in scenes:
-        name = word(scene, "scene")
-        exponent = number(scene, "lyapunov_per_s")
-        if not is_chaotic(scene):
-            yield f"{name}: the motion is regular, so no error grows exponentially for long."
-            continue
-        long = [row for row in of(cases, scene=name) if _stayed(row, exponent) >= _LONG]
-        rates = finite(long, "growth_per_s")
-        if not rates:
-            yield f"{name}: no error grew for long enough to tell its rate."
-            continue
-        ratios = [rate / exponent for rate in rates]
-        verdict = (
-            "as chaos has it"
-            if min(ratios) >= 0.5 and max(ratios) <= 2.0
-            else "which is no close match: the exponent is a mean over a much longer time than these first seconds, and a "
-            "fit over a few Lyapunov times takes in the method's own growth of errors as well"
-        )
-        yield (
-            f"{name}: in the {counted(len(rates), 'case')} that stay with the truth for {_LONG:.0f} Lyapunov times or more, "
-            f"errors grow at {spanned(rates, 'growth_per_s')} per s, {_ratios(ratios)} times the exponent; {verdict}."
-        )
+        yield f"{word(scene, 'scene')}: {_growth(scene, of(cases, scene=word(scene, 'scene')))}"
 
 
-def _ratios(ratios: Sequence[float]) -> str:
-    low, high = number_text(min(ratios), ".2g"), number_text(max(ratios), ".2g")
+def _growth(scene: Row, cases: Sequence[Row]) -> str:
+    if not is_chaotic(scene):
+        return "the motion is regular, so no error grows exponentially for long."
+    exponent, neighbour = number(scene, "lyapunov_per_s"), number(scene, "growth_per_s")
+    measure = exponent if math.isnan(neighbour) else neighbour
+    told = (
+        f"the exponent is {number_text(exponent)} per s"
+        if math.isnan(neighbour)
+        else f"a neighbouring start leaves the truth at {number_text(neighbour)} per s"
+    )
+    rates = finite((row for row in cases if _stayed(row, exponent) >= _LONG), "growth_per_s")
+    if not rates:
+        return f"{told}; no error grew for long enough to be compared with that."
+    ratios = [rate / measure for rate in rates]
+    near = sum(1 / _NEAR <= ratio <= _NEAR for ratio in ratios)
+    return (
+        f"{told}, and in the cases that stay with the truth for {_LONG:.0f} Lyapunov times or more errors grow at "
+        f"{_span(ratios)} times that rate: {near} of {len(ratios)} are within a factor of {_NEAR:g} of what chaos does."
+    )
+
+
+def _span(ratios: Sequence[float]) -> str:
+    low, high = number_text(min(ratios)), number_text(max(ratios))
     return low if low == high else f"{low} to {high}"
 
 

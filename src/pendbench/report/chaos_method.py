@@ -8,7 +8,8 @@ from typing import Any, Final
 from pendbench.report.columns import is_missing, number_text
 
 _POINTS: Final = """\
-- **Error.** e(t) is the largest distance of any mass from where the reference has it, over the chain's length L.{sample}
+- **Error.** e(t) is the largest distance of any mass from where the reference has it, over the chain's length
+  L.{sample}
 - **Reference.** Two solves in double-double arithmetic (about 32 digits) that share neither formulation nor order nor
   steps: angles with a recursion along the chain at order 28, and unit vectors with the rods' tensions at order 24. The
   horizon is the last sample up to which they agree to 1e-9 L; the reference's error is their largest difference up to
@@ -21,8 +22,9 @@ _POINTS: Final = """\
   acceleration. Above 1e-6, and above ten times the last change of that limit, it is another system.
 - **Order.** The slope of log e against log step between the two finest steps whose errors{order_time} are neither
   rounding (below 1e-13) nor large (above 0.03). A plateau is an error that finer steps do not bring down.
-- **Growth.** A least-squares exponential through e(t) while it lies between 1e-12 and 1e-2. The Lyapunov exponent is
-  the mean rate at which two solutions part that are brought back to 1e-7 of each other again and
+- **Growth.** A least-squares exponential through e(t) while it lies between 1e-12 and 1e-2; and the same for a start
+  that is 1e-10 rad away and solved accurately, which shows what chaos does in these seconds to any small error. The
+  Lyapunov exponent is the mean rate at which two solutions part that are brought back to 1e-7 of each other again and
   again{lyapunov_time}.
 - **Energy.** From our own formula and the engine's angles and rates, never from the engine. Its scale is the full range
   of the potential, or the kinetic energy at the start where that is larger.

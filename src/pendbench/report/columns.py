@@ -41,19 +41,35 @@ def _text(heading: str, meaning: str, *, is_time: bool = False) -> Column:
 
 
 def _threshold(name: str) -> dict[str, Column]:
-    key, passes = f"t_{name}", "e(t) passes the threshold in the column's name"
+    passes = "e(t) passes the threshold in the column's name"
     return {
-        f"{key}_s": Column("s", ".3g", f"to {name}, s", f"the first time at which {passes}: the median over the starts (in "
-                           "starts.csv: of one start); empty where the median start does not get there before its horizon"),
-        f"{key}_min_s": Column("s", ".3g", "earliest", f"the earliest start's time until {passes}"),
-        f"{key}_max_s": Column("s", ".3g", "latest", f"the latest start's time until {passes}; empty where a start does "
-                               "not get there before its horizon"),
-        f"{key}_lyapunov": Column("Lyapunov times", ".3g", "Lyapunov times", "the median time, s, times the scene's "
-                                  "Lyapunov exponent; empty where the motion is regular"),
-        f"{key}_not_reached": Column("1", "d", "not reached", "how many starts do not get there before their horizon"),
-        f"{key}_band_s": Column("s", ".1e", "band", "the widest gap between the two samples around one of these times: "
-                                "how well it is known"),
-    }  # fmt: skip
+        f"t_{name}_s": Column(
+            "s",
+            ".3g",
+            f"to {name}, s",
+            f"the first time at which {passes}: the median over the starts (in starts.csv: of one start); empty where "
+            "the median start does not get there before its horizon",
+        ),
+        f"t_{name}_min_s": Column("s", ".3g", "earliest", f"the earliest start's time until {passes}"),
+        f"t_{name}_max_s": Column(
+            "s",
+            ".3g",
+            "latest",
+            f"the latest start's time until {passes}; empty where a start does not get there before its horizon",
+        ),
+        f"t_{name}_lyapunov": Column(
+            "Lyapunov times",
+            ".3g",
+            "Lyapunov times",
+            "the median time, s, times the scene's Lyapunov exponent; empty where the motion is regular",
+        ),
+        f"t_{name}_not_reached": Column(
+            "1", "d", "not reached", "how many starts do not get there before their horizon"
+        ),
+        f"t_{name}_band_s": Column(
+            "s", ".1e", "band", "the widest gap between the two samples around one of these times: how well it is known"
+        ),
+    }
 
 
 _WHAT: Final = {
@@ -71,69 +87,113 @@ _WHAT: Final = {
 _TRUTH: Final = {
     "duration_s": Column("s", ".3g", "duration, s", "how long the scene lasts"),
     "starts": Column("1", "d", "starts", "starts that were run: the scene's own and the perturbed ones"),
-    "horizon_s": Column("s", ".4g", "horizon, s", "until when the reference is known; nothing is compared past it"),
-    "horizon_min_s": Column("s", ".4g", "earliest horizon, s", "the earliest horizon of the starts"),
-    "horizon_max_s": Column("s", ".4g", "latest horizon, s", "the latest horizon of the starts"),
-    "reference_error": Column("L", ".1e", "reference error", "the largest e between the reference's two solves up to "
-                              "the horizon"),
-    "lyapunov_per_s": Column("1/s", ".3g", "Lyapunov exponent, 1/s", "the rate at which neighbouring starts of the scene "
-                             "part; in causes.csv empty where the motion is regular"),
-    "lyapunov_error_per_s": Column("1/s", ".1g", "its error, 1/s", "the standard error of the exponent, over blocks of "
-                                   "time"),
+    "horizon_s": Column("s", ".3g", "horizon, s", "until when the reference is known; nothing is compared past it"),
+    "horizon_min_s": Column("s", ".3g", "earliest horizon, s", "the earliest horizon of the starts"),
+    "horizon_max_s": Column("s", ".3g", "latest horizon, s", "the latest horizon of the starts"),
+    "reference_error": Column(
+        "L", ".1e", "reference error", "the largest e between the reference's two solves up to the horizon"
+    ),
+    "lyapunov_per_s": Column(
+        "1/s",
+        ".3g",
+        "Lyapunov exponent, 1/s",
+        "the rate at which neighbouring starts of the scene part; in causes.csv empty where the motion is regular",
+    ),
+    "lyapunov_error_per_s": Column(
+        "1/s", ".1g", "its error, 1/s", "the standard error of the exponent, over blocks of time"
+    ),
     "chaotic": _text("chaotic", "whether the exponent can be told from regular motion"),
-}  # fmt: skip
+}
 
 _ERRORS: Final = {
     "t_s": Column("s", ".4g", "t, s", "time"),
-    "error": Column("L", ".1e", "e", "the largest distance of any mass from where it should be; empty past the horizon"),
+    "error": Column(
+        "L", ".1e", "e", "the largest distance of any mass from where it should be; empty past the horizon"
+    ),
     "energy_error": Column("energy scale", ".1e", "energy error", "deviation of the energy from its first value"),
     "error_max": Column("L", ".1e", "e max", "the largest e(t) up to the horizon, or to where the run ended"),
     "error_half": Column("L", ".1e", "e to half horizon", "the largest e(t) up to half of the horizon"),
-    "angle_error_max_rad": Column("rad", ".1e", "angle error", "the largest error of any angle, wrapped, up to the "
-                                  "horizon"),
-    "reference_error_half": Column("L", ".1e", "reference error to half", "the reference's own e up to half of the "
-                                   "horizon"),
-}  # fmt: skip
+    "angle_error_max_rad": Column(
+        "rad", ".1e", "angle error", "the largest error of any angle, wrapped, up to the horizon"
+    ),
+    "reference_error_half": Column(
+        "L", ".1e", "reference error to half", "the reference's own e up to half of the horizon"
+    ),
+}
 
 _ENERGY: Final = {
-    "energy_drift_max": Column("energy scale", ".1e", "energy drift", "the largest deviation of the energy from its "
-                               "first value, over the whole run"),
-    "energy_drift_final": Column("energy scale", ".1e", "final drift", "the deviation of the energy at the run's end"),
+    "energy_drift_max": Column(
+        "energy scale",
+        ".1e",
+        "energy drift",
+        "the largest deviation of the energy from its first value, over the whole run",
+    ),
+    "energy_drift_final": Column("energy scale", ".1e", "final drift", "the energy's deviation at the run's end"),
     "energy_drift_band": Column("energy scale", ".1e", "band", "the energy's largest value less its smallest one"),
-    "energy_drift_slope_per_s": Column("energy scale/s", ".1e", "drift per s", "the slope of a least-squares line "
-                                       "through the energy: near zero for a method that keeps it in a band"),
-    "energy_drift_half": Column("energy scale", ".1e", "drift to half", "the largest deviation up to half of the "
-                                "horizon"),
-    "gap_max": Column("1", ".1e", "joint gap", "how far the worst rod was from its length, over that length; 0 for "
-                      "engines that work in angles"),
-}  # fmt: skip
+    "energy_drift_slope_per_s": Column(
+        "energy scale/s",
+        ".1e",
+        "drift per s",
+        "the slope of a least-squares line through the energy: near zero for a method that keeps it in a band",
+    ),
+    "energy_drift_half": Column(
+        "energy scale", ".1e", "drift to half", "the largest deviation of the energy up to half of the horizon"
+    ),
+    "gap_max": Column(
+        "1",
+        ".1e",
+        "joint gap",
+        "how far the worst rod was from its length, over that length; 0 for engines that work in angles",
+    ),
+}
 
 _CAUSES: Final = {
-    "model_error": Column("1", ".1e", "model error", "how far the engine's accelerations are from the equations', over "
-                          "the largest acceleration"),
-    "model_error_limit": Column("1", ".1e", "last change", "what the last refinement changed in the model error: how well "
-                                "it is known, give or take a factor of some tens"),
+    "model_error": Column(
+        "1",
+        ".1e",
+        "model error",
+        "how far the engine's accelerations are from the equations', over the largest acceleration",
+    ),
+    "model_error_limit": Column(
+        "1",
+        ".1e",
+        "last change",
+        "what the last refinement changed in the model error: how well it is known, give or take a factor of some tens",
+    ),
     "order_claimed": Column("1", "d", "order claimed", "the method's order by its makers", empty="adaptive"),
     "order_observed": Column("1", ".3g", "order observed", "the order with which the error falls between two steps"),
     "order_dt_coarse": Column("s", ".3g", "from step, s", "the coarser of the two steps that show the order"),
     "order_dt_fine": Column("s", ".3g", "to step, s", "the finer of the two steps that show the order"),
-    "plateau": Column("L", ".1e", "plateau", "the error below which a smaller step does not bring it", empty="none"),
-    "growth_per_s": Column("1/s", ".3g", "growth, 1/s", "the rate of the exponential through e(t) between 1e-12 and 1e-2 "
-                           "(in causes.csv: the median over starts and steps)"),
+    "plateau": Column("L", ".1e", "plateau", "the error below which smaller steps do not bring it", empty="none"),
+    "growth_per_s": Column(
+        "1/s",
+        ".3g",
+        "growth, 1/s",
+        "the rate of the exponential through e(t) between 1e-12 and 1e-2 (in causes.csv: the median over starts and "
+        "steps; in scenes.csv: of a neighbouring start)",
+    ),
+    "neighbours_growth_per_s": Column(
+        "1/s",
+        ".3g",
+        "a neighbour's growth, 1/s",
+        "the rate at which a start 1e-10 rad away leaves the truth: what chaos does here to any small error",
+    ),
     "cause": _text("cause", "what makes this method leave the truth"),
-}  # fmt: skip
+}
 
 _COSTS: Final = {
     "step_us": Column("us", ".3g", "step, µs", "the median cost of a step", is_time=True),
-    "step_spread": Column("1", ".0%", "spread", "largest less smallest sample of the step's cost, over the median",
-                          is_time=True),
+    "step_spread": Column(
+        "1", ".0%", "spread", "largest less smallest sample of the step's cost, over the median", is_time=True
+    ),
     "simulated_s_per_s": Column("s/s", ".3g", "simulated s/s", "simulated time per time spent stepping", is_time=True),
     "build_s": Column("s", ".2g", "build, s", "building the run", is_time=True),
-    "first_call_s": Column("s", ".2g", "first call, s", "the first step of all, with what is compiled or loaded then",
-                           is_time=True),
+    "first_call_s": Column(
+        "s", ".2g", "first call, s", "the first step of all, with what is compiled or loaded then", is_time=True
+    ),
     "run_s": Column("s", ".3g", "run, s", "time spent stepping up to the horizon", is_time=True),
-    "flags": _text("flags", "what a reader should know about the row, the quality of its timing included", is_time=True),
-}  # fmt: skip
+    "flags": _text("flags", "what a reader should know about the row, its timing included", is_time=True),
+}
 
 #: Every column by its name in the CSV files, in the order in which they are written.
 COLUMNS: Final = MappingProxyType(

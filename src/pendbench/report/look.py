@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from pendbench.report.plots import Colour, hue, shades
-from pendbench.report.rows import Row, distinct, finite, method_name, number, of
+from pendbench.report.plots import GREY, Colour, hue, shades
+from pendbench.report.rows import Row, distinct, finite, method_name, number, of, word
+from pendbench.report.text import label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Where a run that did not end well ended.
 ENDED: Final[dict[str, Any]] = {"marker": "X", "markersize": 11, "markeredgecolor": "white", "linestyle": "none"}
@@ -20,7 +25,8 @@ _DASHES: Final[tuple[Any, ...]] = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (6, 
 @dataclass(frozen=True)
 class Look:
     """engines: in the order of their hues. methods: of each engine, in the order of their shades. steps: s, coarse
-    to fine, in the order of their strokes."""
+    to fine, in the order of their strokes.
+    """
 
     engines: list[str]
     methods: dict[str, list[str]]
@@ -59,3 +65,11 @@ class Look:
             "linewidth": self.width(engine, method),
             "linestyle": self.stroke(number(row, "dt")),
         }
+
+
+def name_missing(axes: Axes, rows: Sequence[Row]) -> None:
+    """Say in a panel how many cases it cannot show, and what became of them."""
+    statuses = Counter(word(row, "status") or "without a status" for row in rows)
+    if statuses:
+        text = ", ".join(f"{count} {label(status)}" for status, count in statuses.items())
+        axes.annotate(f"not drawn: {text}", (0.02, 0.02), xycoords="axes fraction", fontsize=8, color=GREY)

@@ -52,6 +52,11 @@ def is_ok(row: Row) -> bool:
     return word(row, "status") in ("ok", "")
 
 
+def is_noisy(row: Row) -> bool:
+    """Whether the timing of a case is flagged as noise."""
+    return "noisy timing" in word(row, "flags")
+
+
 def in_order(rows: Iterable[Row]) -> list[Row]:
     """Rows by engine, method, settings and step, the coarsest step first."""
 

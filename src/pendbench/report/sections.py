@@ -11,12 +11,11 @@ import numpy as np
 
 from pendbench.report.columns import COLUMNS, column, in_order, shown
 from pendbench.report.plots import Picture
-from pendbench.report.rows import Row, case_name, finite, is_ok, number, word
+from pendbench.report.rows import Row, case_name, finite, is_noisy, is_ok, number, word
 from pendbench.report.text import counted, listed, markdown, table
 from pendbench.study.results import Results
 from pendbench.trajectory import STATUSES
 
-_NOISY: Final = "noisy timing"
 _LISTED: Final = 40
 
 
@@ -46,8 +45,8 @@ def opening(results: Results) -> list[str]:
     parts = [f"# {markdown(results.title)}"]
     if results.quick:
         parts.append(
-            "**This is the quick variant of the study**: fewer scenes, starts or steps, for a first look. Its numbers are "
-            "measured in the same way as the full study's."
+            "**This is the quick variant of the study**: fewer scenes, starts or steps, for a first look. Its numbers "
+            "are measured in the same way as the full study's."
         )
     return parts
 
@@ -95,12 +94,14 @@ def timing_trust(cases: Sequence[Row]) -> str:
     spreads = finite(timed, "step_spread")
     middle, most = shown("step_spread", float(np.median(spreads))), shown("step_spread", max(spreads))
     parts = [
-        f"{counted(len(timed), 'case')} of {len(cases)} were timed, one at a time. The spread of a step's cost (largest "
-        f"less smallest sample, over the median) is {middle} in the median case and {most} in the worst."
+        f"{counted(len(timed), 'case')} of {len(cases)} were timed, one at a time. The spread of a step's cost "
+        f"(largest less smallest sample, over the median) is {middle} in the median case and {most} in the worst."
     ]
-    noisy = sorted((row for row in timed if _NOISY in word(row, "flags")), key=lambda row: -number(row, "step_spread"))
+    noisy = sorted((row for row in timed if is_noisy(row)), key=lambda row: -number(row, "step_spread"))
     if not noisy:
         return f"{parts[0]} None is marked as noisy."
+    if 2 * len(noisy) > len(timed):
+        parts.append("**Most of these timings are noise: draw no conclusions from costs.** The machine was busy.")
     parts.append(
         f"{counted(len(noisy), 'of them is', 'of them are')} noisy: the machine did something else in between. Trust "
         "these costs to the spread given and no further; for better ones run the study again on an idle machine:"

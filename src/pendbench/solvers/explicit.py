@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled
+from pendbench.compiled import compiled, inlined
 from pendbench.solvers.problem import acceleration, derivative
 from pendbench.solvers.tableaux import Tableau
 
 
-@compiled
+@inlined
 def stage_state(a: FloatArray, row: int, h: float, y: FloatArray, k: FloatArray, out: FloatArray) -> None:
     """Write `y + h sum_j a[row, j] k[j]` over the stages before `row` into `out`."""
     out[:] = y

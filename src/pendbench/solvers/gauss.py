@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled
+from pendbench.compiled import compiled, inlined
 from pendbench.solvers.problem import generalized_force, velocity
 
 _MOST_ITERATIONS = 60
@@ -46,7 +46,7 @@ def gauss_legendre(stages: int) -> Collocation:
     )
 
 
-@compiled
+@inlined
 def _combine(weights: FloatArray, h: float, start: FloatArray, slopes: FloatArray, out: FloatArray) -> None:
     """Out = start + h sum_j weights[j] slopes[j]."""
     for i in range(len(start)):
@@ -56,7 +56,7 @@ def _combine(weights: FloatArray, h: float, start: FloatArray, slopes: FloatArra
         out[i] = start[i] + h * total
 
 
-@compiled
+@inlined
 def _add(weights: FloatArray, h: float, slopes: FloatArray, y: FloatArray, carry: FloatArray) -> None:
     """Y += h sum_j weights[j] slopes[j], with the rounding errors kept in `carry`."""
     for i in range(len(y)):
@@ -69,7 +69,7 @@ def _add(weights: FloatArray, h: float, slopes: FloatArray, y: FloatArray, carry
         y[i] = value
 
 
-@compiled
+@inlined
 def _guess(extrapolate: FloatArray, slopes: FloatArray, room: FloatArray) -> None:
     """Replace the slopes of the step before by what their polynomial says of this one."""
     room[:] = slopes

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled
+from pendbench.compiled import compiled, inlined
 
 _MOST_ITERATIONS = 50
 
@@ -25,7 +25,7 @@ class Rods(NamedTuple):
     scratch: FloatArray
 
 
-@compiled
+@inlined
 def _solve_tridiagonal(below: FloatArray, diagonal: FloatArray, above: FloatArray, right: FloatArray) -> None:
     """Solve in place, the answer in `right`. below[i] and above[i] stand left of and right of diagonal[i]."""
     n = len(diagonal)
@@ -38,7 +38,7 @@ def _solve_tridiagonal(below: FloatArray, diagonal: FloatArray, above: FloatArra
         right[i] = (right[i] - above[i] * right[i + 1]) / diagonal[i]
 
 
-@compiled
+@inlined
 def _push(masses: FloatArray, along_x: FloatArray, along_y: FloatArray, force: FloatArray, out: FloatArray) -> None:
     """Add to the points' `out` (n, 2) what forces in the rods, each along its (x, y), do to them over their masses."""
     n = len(masses)
@@ -52,7 +52,7 @@ def _push(masses: FloatArray, along_x: FloatArray, along_y: FloatArray, force: F
             out[i - 1, 1] -= y / masses[i - 1]
 
 
-@compiled
+@inlined
 def _rods_of(points: FloatArray, x: FloatArray, y: FloatArray) -> None:
     """The rods (x, y) between `points` (n, 2), the first from the origin."""
     x[0], y[0] = points[0, 0], points[0, 1]
@@ -61,7 +61,7 @@ def _rods_of(points: FloatArray, x: FloatArray, y: FloatArray) -> None:
         y[i] = points[i, 1] - points[i - 1, 1]
 
 
-@compiled
+@inlined
 def _fill(
     masses: FloatArray,
     row_x: FloatArray,
@@ -81,7 +81,7 @@ def _fill(
         above[i] = -inverse * (row_x[i] * x[i + 1] + row_y[i] * y[i + 1]) if i + 1 < len(masses) else 0.0
 
 
-@compiled
+@inlined
 def _count_turns(old_x: FloatArray, new_x: FloatArray, new_y: FloatArray, turns: FloatArray) -> None:
     """A rod above the pivot whose x changes sign went over the top (with less than a quarter turn a step)."""
     for i in range(len(turns)):

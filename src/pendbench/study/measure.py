@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Mapping
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -29,7 +31,10 @@ class Drift(NamedTuple):
 
 
 class OrderFit(NamedTuple):
-    """The order seen between the steps `coarse` and `fine` (s), and the error at which it stops, or None."""
+    """The order seen between the steps `coarse` and `fine` (s), and the error at which it stops, or None.
+
+    Where a plateau is all there is to see, the order is nan and the steps are the two finest.
+    """
 
     order: float
     coarse: float
@@ -54,11 +59,15 @@ def time_to(t: FloatArray, error: FloatArray, threshold: float) -> Crossing | No
 
 def drift(t: FloatArray, energy: FloatArray, scale: float) -> Drift:
     """How energy (k,) J at times t (k,) s strays from its first value, over `scale` (J)."""
-    if scale <= 0 or not len(t):
-        return Drift(np.nan, np.nan, np.nan, np.nan)
-    relative = (energy - energy[0]) / scale
-    slope = float(np.polyfit(t, relative, 1)[0]) if len(t) > 1 else np.nan
-    return Drift(float(np.abs(relative).max()), float(relative[-1]), float(np.ptp(relative)), slope)
+    if not scale > 0 or not len(t):
+        return Drift(math.nan, math.nan, math.nan, math.nan)
+    with np.errstate(all="ignore"):
+        relative = (energy - energy[0]) / scale
+    final = float(relative[-1])
+    if not np.all(np.isfinite(relative)):  # it blew up: no line goes through that
+        return Drift(math.inf, final, math.inf, math.nan)
+    slope = float(np.polyfit(t, relative, 1)[0]) if len(t) > 1 else math.nan
+    return Drift(float(np.abs(relative).max()), final, float(np.ptp(relative)), slope)
 
 
 def growth_rate(t: FloatArray, error: FloatArray, low: float, high: float) -> float:
@@ -76,23 +85,41 @@ def growth_rate(t: FloatArray, error: FloatArray, low: float, high: float) -> fl
     return float(np.polyfit(t[begin:end], np.log(error[begin:end]), 1)[0])
 
 
-def observed_order(dt: FloatArray, error: FloatArray, floor: float, ceiling: float) -> OrderFit | None:
-    """The order with which `error` (j,) falls with the steps `dt` (j,) s.
+#: An error that falls by less than half of what even order 1 brings does not fall.
+_FLAT: Final = 0.5
+#: Orders of neighbouring pairs of steps this close confirm each other.
+_SAME: Final = 0.2
 
-    Taken from the two finest neighbouring steps whose errors lie between `floor` (rounding) and `ceiling` (no longer
-    small) and still fall; the plateau is the error from which a finer step no longer brings it down by half of what
-    that order promises. None where there are no two such steps.
+
+def observed_order(dt: FloatArray, error: FloatArray, floor: float, ceiling: float) -> OrderFit | None:
+    """The order with which `error` (j,) falls with the steps `dt` (j,) s, and where it stops falling.
+
+    Each two neighbouring steps show an order, log(e1 / e2) / log(dt1 / dt2), where the coarser one's error is below
+    `ceiling` (small), the finer one's above `floor` (not rounding), and it falls at all. A floor that is near bends
+    orders down, terms of higher order at coarse steps bend them up; so the order is that of the finest pair that is
+    confirmed by the pair before it, or as good as the steepest. The plateau is the smallest error where finer steps did
+    not bring half of what that order promises, unless it is below `floor`. Where no pair shows an order, there still is
+    a plateau if the finest step did not bring the error down. None where there is neither.
     """
-    by_step = np.argsort(dt)[::-1]
-    h, e = dt[by_step], error[by_step]
-    usable = [i for i in range(len(h) - 1) if e[i] < ceiling and e[i + 1] > floor and e[i + 1] < e[i]]
-    orders = {i: float(np.log(e[i] / e[i + 1]) / np.log(h[i] / h[i + 1])) for i in usable}
-    if not orders:
-        return None
-    # Past the steps that show the order, rounding or another floor bends the line: it only ever gets flatter.
-    best = max(orders.values())
-    shown = [i for i, order in orders.items() if order > 0.75 * best]
-    last = shown[-1]
-    stops = last + 2 < len(h) and not e[last + 2] < e[last + 1] / (h[last + 1] / h[last + 2]) ** (0.5 * orders[last])
-    plateau = float(e[last + 1 :].min()) if stops else None
-    return OrderFit(orders[last], float(h[last]), float(h[last + 1]), plateau)
+    known = np.isfinite(error)
+    by_step = np.argsort(dt[known])[::-1]
+    h, e = dt[known][by_step], error[known][by_step]
+    orders = {i: _order(h, e, i) for i in range(len(h) - 1) if e[i + 1] > floor and e[i] > 0}
+    shown = {i: order for i, order in orders.items() if e[i] < ceiling and order >= _FLAT}
+    if not shown:
+        flat = orders.get(len(h) - 2, math.inf) < _FLAT and e.min() > floor
+        return OrderFit(math.nan, float(h[-2]), float(h[-1]), float(e.min())) if flat else None
+    last = max(i for i in shown if _confirmed(shown, i))
+    order, start = shown[last], last + 1
+    promised = e[start] * (h[-1] / h[start]) ** (0.5 * order)
+    level = float(e[start:].min())
+    stops = start + 1 < len(h) and e[-1] > promised and level > floor
+    return OrderFit(order, float(h[last]), float(h[start]), level if stops else None)
+
+
+def _order(h: FloatArray, e: FloatArray, i: int) -> float:
+    return float(np.log(e[i] / e[i + 1]) / np.log(h[i] / h[i + 1]))
+
+
+def _confirmed(orders: Mapping[int, float], i: int) -> bool:
+    return orders[i] > 0.75 * max(orders.values()) or abs(orders[i] - orders.get(i - 1, math.inf)) <= _SAME

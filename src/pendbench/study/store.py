@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-import zipfile
+import re
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.files import write_whole
+
+_KEY: Final = "key of these arrays"
+_KEY_LENGTH: Final = 24
+# Also what a write leaves behind that was killed: a dot, the name, and more.
+_OURS: Final = re.compile(rf"[0-9a-f]{{{_KEY_LENGTH}}}\.(json|npz)|\.[0-9a-f]{{{_KEY_LENGTH}}}\.(json|npz)\..+")
 
 
 @cache
@@ -28,7 +33,7 @@ def source_digest() -> str:
 
 def key_of(*parts: object) -> str:
     """A name for what depends on `parts` (their repr) and on the project's source."""
-    return hashlib.sha256(repr((source_digest(), *parts)).encode()).hexdigest()[:24]
+    return hashlib.sha256(repr((source_digest(), *parts)).encode()).hexdigest()[:_KEY_LENGTH]
 
 
 class Store:
@@ -44,9 +49,9 @@ class Store:
         """What was saved under `key`, or None where there is nothing that can be read."""
         try:
             record = json.loads(self._path(key, "json").read_text("utf-8"))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return None
-        return record["value"] if isinstance(record, dict) and record.get("key") == key else None
+        return record.get("value") if isinstance(record, dict) and record.get("key") == key else None
 
     def save(self, key: str, value: Any) -> None:
         """Save a value of JSON's types; numbers may be nan or infinite."""
@@ -56,17 +61,18 @@ class Store:
     def load_arrays(self, key: str) -> dict[str, FloatArray] | None:
         """The arrays that were saved under `key`, or None where there is nothing that can be read."""
         try:
-            with np.load(self._path(key, "npz"), allow_pickle=False) as arrays:
-                return {name: arrays[name] for name in arrays.files}
-        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
+            with open(self._path(key, "npz"), "rb") as file, np.load(file, allow_pickle=False) as archive:
+                arrays = {name: archive[name] for name in archive.files}
+        except Exception:  # what is damaged, or of another making, fails in any way: numpy, zipfile and zlib raise
             return None
-
-    def clear(self) -> None:
-        """Forget all of it."""
-        for ending in ("json", "npz"):
-            for path in self.folder.glob(f"*.{ending}"):
-                path.unlink(missing_ok=True)
+        return arrays if str(arrays.pop(_KEY, "")) == key else None
 
     def save_arrays(self, key: str, arrays: dict[str, FloatArray]) -> None:
         """Save arrays by name."""
-        write_whole(self._path(key, "npz"), lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
+        write_whole(self._path(key, "npz"), lambda file: np.savez(file, **arrays, **{_KEY: np.array(key)}))  # type: ignore[arg-type]
+
+    def clear(self) -> None:
+        """Forget all of it. Files that are not the store's stay."""
+        for path in self.folder.glob("*"):
+            if _OURS.fullmatch(path.name):
+                path.unlink(missing_ok=True)

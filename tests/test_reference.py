@@ -1,0 +1,223 @@
+"""The truth against everything that could know better, and how it says what it does not know."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pendbench import truth
+from pendbench.errors import InputError
+from pendbench.physics import dense, extended
+from pendbench.physics.exact import single_pendulum
+from pendbench.physics.geometry import distance
+from pendbench.scene import load_scene
+from pendbench.truth import AGREEMENT, reference
+from scenes import chain, random_chain
+
+GRAVITY = 9.81
+EPS = np.finfo(float).eps
+SAMPLES = np.linspace(0.0, 10.0, 501)
+
+
+@pytest.fixture(scope="module")
+def chain10():
+    """The truth of a chaotic scene."""
+    return reference(load_scene("chain10"), SAMPLES)
+
+
+def exact(pairs):
+    """The numbers that rows of (high, low) stand for."""
+    return [mpmath.mpf(float(high)) + mpmath.mpf(float(low)) for high, low in pairs]
+
+
+def derivatives(scene):
+    """dy/dt of the angle form (2 n, 2) and of the vector form (3 n, 2) at the scene's start."""
+    (angles, y), (vectors, z) = extended.angle_form(scene), extended.vector_form(scene)
+    dy, dz = np.empty_like(y), np.empty_like(z)
+    extended._angle_derivative(angles, y, dy)
+    extended._vector_derivative(vectors, z, dz)
+    return dy, dz
+
+
+@pytest.mark.parametrize("gravity", [9.81, None])
+@pytest.mark.parametrize("n", [1, 2, 6, 15])
+def test_two_forms_have_the_same_accelerations(n, gravity):
+    for seed in range(5):
+        dy, dz = derivatives(random_chain(n, seed, spread=4.0, gravity=gravity))
+        with mpmath.workdps(50):
+            ours, theirs = exact(dy[n:]), exact(dz[2 * n :])
+            assert max(abs(a - b) for a, b in zip(ours, theirs, strict=True)) <= 1e-29 * max(map(abs, ours))
+
+
+def test_two_forms_turn_their_rods_alike():
+    """What sines and cosines change by, from what the angles do."""
+    scene = random_chain(6, seed=1, spread=4.0)
+    dy, dz = derivatives(scene)
+    with mpmath.workdps(50):
+        for angle, rate, d_sine, d_cosine in zip(
+            map(float, scene.angles), exact(dy[:6]), exact(dz[:6]), exact(dz[6:12]), strict=True
+        ):
+            assert abs(d_sine - mpmath.cos(angle) * rate) < 1e-29
+            assert abs(d_cosine + mpmath.sin(angle) * rate) < 1e-29
+
+
+@pytest.mark.parametrize("rate", [0.0, 7.0], ids=["swings", "turns over"])
+def test_single_pendulum_is_the_exact_one(rate):
+    scene = chain(1, angle=1.5, rate=rate)
+    found = reference(scene, SAMPLES)
+    theta, omega = single_pendulum(scene, SAMPLES)
+    assert found.horizon == 10.0
+    # The closed form is in doubles, and knows its argument to 4 eps: equations.md (E27).
+    late = 4 * EPS * SAMPLES[:, np.newaxis]
+    assert np.all(np.abs(found.offset(theta)) < np.abs(omega) * late + 2 * EPS * (1 + np.abs(theta)))
+    assert np.all(np.abs(found.omega - omega) < GRAVITY * late + 2 * EPS * (1 + np.abs(omega).max()))
+    assert np.abs(found.offset(theta)[:100] / (1 + np.abs(theta[:100]))).max() < 1e-14
+
+
+def test_thirty_digits_agree():
+    """Taylor series of the textbook's double pendulum, in arithmetic and by a method that share nothing with ours."""
+    scene, until = load_scene("double").with_start([2.0, -1.0], [1.0, -3.0]), 0.2
+    found = reference(scene, [until])
+    with mpmath.workdps(28):
+        start = [mpmath.mpf(float(x)) for x in (*scene.angles, *scene.rates)]
+        expected = mpmath.odefun(textbook_double_pendulum(scene), 0, start)(mpmath.mpf(until))
+        highs = (*found.theta[0], *found.omega[0])
+        lows = (*found.theta_low[0], *found.omega_low[0])
+        errors = [abs(a - b) for a, b in zip(exact(zip(highs, lows, strict=True)), expected, strict=True)]
+        assert max(errors) < 1e-25
+
+
+def textbook_double_pendulum(scene):
+    m1, m2, l1, l2 = (mpmath.mpf(float(x)) for x in (*scene.masses, *scene.lengths))
+    g = mpmath.mpf(scene.effects.gravity)
+
+    def derivative(_, state):
+        a1, a2, w1, w2 = state
+        cos, sin = mpmath.cos_sin(a1 - a2)
+        below = m1 + m2 * sin**2
+        sin1, sin2 = mpmath.sin(a1), mpmath.sin(a2)
+        first = -m2 * sin * (l2 * w2**2 + l1 * w1**2 * cos) - g * ((m1 + m2) * sin1 - m2 * sin2 * cos)
+        second = sin * ((m1 + m2) * l1 * w1**2 + m2 * l2 * w2**2 * cos) + g * (m1 + m2) * (sin1 * cos - sin2)
+        return [w1, w2, first / (l1 * below), second / (l2 * below)]
+
+    return derivative
+
+
+@pytest.mark.parametrize("name", ["double", "chain5"])
+def test_scipy_and_the_dense_form_agree(name):
+    scene = load_scene(name)
+    n = scene.n
+    solved = solve_ivp(
+        lambda _, y: np.concatenate([y[n:], dense.accelerations(scene, y[:n], y[n:])]),
+        (0.0, 1.0),
+        np.concatenate([scene.angles, scene.rates]),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-13,
+    )
+    found = reference(scene, [1.0])
+    # Some hundred steps, each off by the tolerance, and what the motion has made of the first ones.
+    assert np.abs(found.offset(solved.y[:n, -1:].T)).max() < 1e-10
+    assert np.abs(found.omega[0] - solved.y[n:, -1]).max() < 1e-9
+
+
+def test_mirror_image_moves_as_the_mirror_image():
+    scene = random_chain(4, seed=2, spread=2.0)
+    one, other = (reference(s, [1.0]) for s in (scene, scene.with_start(-scene.angles, -scene.rates)))
+    assert one.horizon == other.horizon == 1.0
+    assert np.abs(one.offset(-other.theta) - other.theta_low).max() < 1e-25
+
+
+@pytest.mark.parametrize("form", ["angle", "vector"])
+def test_forward_and_back_is_the_start(form):
+    scene = load_scene("triple").with_start([2.0, -1.0, 0.5], [1.0, 0.0, -2.0])
+    n = scene.n
+    system, start = getattr(extended, f"{form}_form")(scene)
+    solve = truth._Solve(system, start.copy(), truth._weights(14))
+    for _ in range(2):
+        assert solve.advance(0.0, 2.0)
+        solve.state[-n:] *= -1.0
+    with mpmath.workdps(50):
+        assert max(abs(a - b) for a, b in zip(exact(solve.state), exact(start), strict=True)) < 1e-22
+    assert solve.steps > 20  # it did move
+
+
+def test_truth_of_a_chaotic_chain_ends_at_its_horizon(chain10):
+    found, k = chain10, len(chain10.t)
+    assert 4.0 < found.horizon < 6.0
+    assert found.horizon == found.t[-1] == SAMPLES[k - 1]
+    assert found.status == "ok"
+    assert "horizon" in found.reason
+    assert found.theta.shape == found.omega.shape == found.theta_low.shape == found.omega_low.shape == (k, 10)
+    assert found.error == found.disagreement.max() <= AGREEMENT
+    # From rounding to the limit in one stretch of exponential growth, so the end is where it must be.
+    assert found.disagreement[: k // 4].max() < 1e-20
+    assert found.disagreement[-1] > 0.1 * AGREEMENT
+
+
+def test_horizon_hardly_depends_on_the_tolerance(chain10, monkeypatch):
+    """A tenfold tolerance costs the time in which errors grow tenfold, a twentieth of the horizon here."""
+    fine, scene = chain10, load_scene("chain10")
+    monkeypatch.setattr(truth, "_TOLERANCE", 10 * truth._TOLERANCE)
+    coarse = reference(scene, SAMPLES)
+    assert abs(fine.horizon - coarse.horizon) < 0.3
+    # Before it, the two agree as well as the one that knows less says.
+    k = min(len(fine.t), len(coarse.t))
+    offset = coarse.offset(fine.theta[:k]) + fine.theta_low[:k]
+    known = 10 * np.maximum.accumulate(np.maximum(fine.disagreement[:k], coarse.disagreement[:k]))
+    assert np.all(distance(scene.lengths, coarse.theta[:k], offset) < known + 1e-24)
+
+
+def test_calm_scene_is_known_to_its_end():
+    found = reference(load_scene("double_calm"))
+    assert (found.horizon, found.reason) == (10.0, "")
+    assert found.t.shape == (1001,)
+    assert found.error < 1e-24
+
+
+@pytest.mark.parametrize("form", ["angle_form", "vector_form"])
+def test_one_wrong_form_leaves_no_horizon(form, monkeypatch):
+    right = getattr(extended, form)
+
+    def wrong(scene):
+        system, state = right(scene)
+        return system._replace(gravity=system.gravity * (1 + 1e-6)), state
+
+    monkeypatch.setattr(extended, form, wrong)
+    found = reference(load_scene("double"))
+    assert found.horizon <= 0.02
+    assert len(found.t) <= 3
+
+
+def test_offset_has_more_digits_than_the_angles():
+    found = reference(load_scene("double"), [1.0, 2.0])
+    np.testing.assert_array_equal(found.offset(found.theta), -found.theta_low)
+    assert 0 < np.abs(found.theta_low).max() < 1e-15
+    assert found.offset(found.theta[:1]).shape == (1, 2)
+
+
+def test_solve_that_cannot_go_on_says_so(monkeypatch):
+    monkeypatch.setattr(truth, "_MOST_STEPS", 50)
+    found = reference(load_scene("chain5"), SAMPLES)
+    assert 0.0 < found.horizon < 10.0
+    assert "steps" in found.reason
+
+
+def test_default_times_fill_the_scene():
+    scene = chain(1, angle=0.3, duration=0.5)
+    np.testing.assert_array_equal(reference(scene).t, np.linspace(0.0, 0.5, 1001))
+
+
+def test_one_number_is_one_time():
+    assert reference(chain(1), 0.25).t == [0.25]
+
+
+@pytest.mark.parametrize(
+    "times",
+    [[], [-1.0, 1.0], [0.0, 0.0], [1.0, 0.5], [0.0, np.nan], [np.inf], [[0.0, 1.0]], [[0.0], [1.0, 2.0]], "soon", [1j]],
+)
+def test_bad_times_are_refused(times):
+    with pytest.raises(InputError, match=r"^times cannot be used; allowed: "):
+        reference(chain(1), times)
