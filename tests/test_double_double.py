@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from pendbench.solvers import double_double
 from pendbench.solvers.double_double import add, divide, multiply, scale, sine_cosine, split, subtract
 
 PROMISED = 1e-31
@@ -85,6 +86,13 @@ def test_results_are_normalised():
         for a, b in zip(ours, others, strict=True):
             high, low = function(a, b)
             assert high + low == high
+
+
+def test_no_product_is_fused_with_a_sum_behind_our_back():
+    """An error that was computed of a rounded product is not that of one that was never rounded."""
+    kernels = [kernel for kernel in vars(double_double).values() if hasattr(kernel, "targetoptions")]
+    assert len(kernels) >= 9
+    assert not any(kernel.targetoptions.get("fastmath") for kernel in kernels)
 
 
 def test_one_third_to_32_digits():

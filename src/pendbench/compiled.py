@@ -28,7 +28,10 @@ _PACKAGE = Path(__file__).resolve().parent
 _KERNEL_SOURCES = ("compiled.py", "physics/*.py", "solvers/*.py")
 
 #: Division by zero gives inf or nan, as in numpy: a test before each division would cost time and catch nothing.
+#: A product and a sum may be rounded once instead of twice.
 _OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}}
+
+_INLINED: Any = {**_OPTIONS, "forceinline": True}
 
 _kernels: list[Any] = []
 _sources_outside: list[Path] = []
@@ -75,16 +78,21 @@ def _keep_on_disk(kernel: Any) -> None:
 
 def compiled(function: Kernel) -> Kernel:
     """Compile `function` when it is first called, and keep the machine code on disk."""
-    return _compiled(function, inline=False)
+    return _compiled(function, _OPTIONS)
 
 
 def inlined(function: Kernel) -> Kernel:
     """The same for a small kernel that is made part of whatever calls it: passing arrays costs as much as it does."""
-    return _compiled(function, inline=True)
+    return _compiled(function, _INLINED)
 
 
-def _compiled(function: Kernel, *, inline: bool) -> Kernel:
-    kernel: Kernel = numba.njit(forceinline=inline, **_OPTIONS)(function)
+def as_written(function: Kernel) -> Kernel:
+    """The same for a kernel that lives by its rounding errors: every operation is rounded, and for itself."""
+    return _compiled(function, {**_OPTIONS, "fastmath": False})
+
+
+def _compiled(function: Kernel, options: Any) -> Kernel:
+    kernel: Kernel = numba.njit(**options)(function)
     _keep_on_disk(kernel)
     _kernels.append(kernel)
     return kernel
@@ -106,7 +114,7 @@ def specialise(generic: Callable[..., None], system: type, kernel: Callable[...,
 
         return call
 
-    overload(generic, jit_options={**_OPTIONS, "forceinline": True}, strict=False)(choose)
+    overload(generic, jit_options=_INLINED, strict=False)(choose)
 
 
 def _know_source(source: Path) -> None:

@@ -13,7 +13,6 @@ from pendbench.physics.trigonometry import direction, write_bends
 from pendbench.scene import Scene
 from pendbench.solvers import problem
 
-
 # The rows of a system's scratch. Outwards, each link's tension takes the place of the cosine it no longer needs.
 _OWN, _PASSED, _ACROSS, _COSINE = range(4)
 _TENSION = _COSINE

@@ -1,7 +1,7 @@
 """Sines and cosines that vectorise: loops over them run several angles at a time, which calls of libm do not.
 
 Reduction to within pi/4 with pi/2 in three parts (Cody and Waite, Software Manual for the Elementary Functions, 1980)
-and the polynomials of fdlibm (Sun Microsystems, 1993, files k_sin.c and k_cos.c): errors below 1.5 units in the last
+and the polynomials of fdlibm (Sun Microsystems, 1993, files k_sin.c and k_cos.c): errors below 2.5 units in the last
 place for angles up to `FAR`. What lies beyond is left to libm.
 """
 
@@ -28,7 +28,7 @@ _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359
 
 @inlined
 def cosine_sine(x: float, tail: float) -> tuple[float, float]:
-    """cos and sin of x + tail, |x| up to `FAR` rad, where tail is at most a rounding error of x."""
+    """Cosine and sine of x + tail, |x| up to `FAR` rad, where tail is at most a rounding error of x."""
     quarters = (x * _PER_QUARTER + _ROUNDER) - _ROUNDER
     r = ((x - quarters * _QUARTER_1) - quarters * _QUARTER_2) - quarters * _QUARTER_3
     z = r * r
@@ -50,8 +50,16 @@ def cosine_sine(x: float, tail: float) -> tuple[float, float]:
 
 @inlined
 def direction(angle: float) -> tuple[float, float]:
-    """cos and sin of any angle, rad."""
+    """Cosine and sine of any angle, rad."""
     return cosine_sine(angle, 0.0) if abs(angle) <= FAR else (math.cos(angle), math.sin(angle))
+
+
+@inlined
+def _bend(inner: float, outer: float) -> tuple[float, float]:
+    """The rounded outer - inner, and what rounding took from it."""
+    bend = outer - inner
+    kept = bend - outer
+    return bend, (outer - (bend - kept)) - (inner + kept)
 
 
 @inlined
@@ -63,12 +71,11 @@ def write_bends(theta: FloatArray, out: FloatArray, cosine: int, sine: int) -> N
     """
     far = 0
     for i in range(len(theta) - 1):
-        inner, outer = theta[i], theta[i + 1]
-        bend = outer - inner
-        kept = bend - outer
-        lost = (outer - (bend - kept)) - (inner + kept)
+        bend, lost = _bend(theta[i], theta[i + 1])
         out[cosine, i], out[sine, i] = cosine_sine(bend, lost)
         far += int(not abs(bend) <= FAR)  # a count, since a maximum would keep the loop from vectorising
     if far:
         for i in range(len(theta) - 1):
-            out[cosine, i], out[sine, i] = direction(theta[i + 1] - theta[i])
+            bend, lost = _bend(theta[i], theta[i + 1])
+            c, s = direction(bend)
+            out[cosine, i], out[sine, i] = c - s * lost, s + c * lost

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendbench.report.columns import COLUMNS, column, in_order, shown
+from pendbench.report.columns import COLUMNS, column, in_order, is_missing, shown
 from pendbench.report.plots import Picture
 from pendbench.report.rows import Row, case_name, finite, is_noisy, is_ok, number, word
 from pendbench.report.text import counted, listed, markdown, table
@@ -127,7 +127,7 @@ def _flat(values: Mapping[str, Any], before: str = "") -> Iterable[tuple[str, st
         elif isinstance(value, (list, tuple)):
             yield f"{before}{name}", ", ".join(str(part) for part in value) or "none"
         else:
-            yield f"{before}{name}", "not known" if value is None else str(value)
+            yield f"{before}{name}", "not known" if is_missing(value) else str(value)
 
 
 def provenance_json(provenance: Mapping[str, Any]) -> str:

@@ -65,7 +65,8 @@ def _step_factor(error: float, order: int) -> float:
         return _GROW_AT_MOST
     if not np.isfinite(error):
         return _SHRINK_AT_MOST
-    return min(_GROW_AT_MOST, max(_SHRINK_AT_MOST, _SAFETY * error ** (-1.0 / order)))
+    wanted: float = _SAFETY * error ** (-1.0 / order)
+    return min(_GROW_AT_MOST, max(_SHRINK_AT_MOST, wanted))
 
 
 @compiled

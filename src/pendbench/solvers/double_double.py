@@ -16,7 +16,7 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled
+from pendbench.compiled import as_written
 
 Number = tuple[float, float]
 
@@ -72,7 +72,7 @@ def _multiply_add(typingctx: Any, a: Any, b: Any, c: Any) -> Any:  # noqa: ARG00
 _fma: Any = intrinsic(_multiply_add)
 
 
-@compiled
+@as_written
 def _two_sum(a: float, b: float) -> Number:
     """The rounded a + b, and its error, exactly."""
     s = a + b
@@ -80,21 +80,21 @@ def _two_sum(a: float, b: float) -> Number:
     return s, (a - (s - t)) + (b - t)
 
 
-@compiled
+@as_written
 def _fast_two_sum(a: float, b: float) -> Number:
     """The same where |a| >= |b|."""
     s = a + b
     return s, b - (s - a)
 
 
-@compiled
+@as_written
 def _two_product(a: float, b: float) -> Number:
     """The rounded a b, and its error, exactly."""
     p = a * b
     return p, _fma(a, b, -p)
 
 
-@compiled
+@as_written
 def add(a: Number, b: Number) -> Number:
     """A + b."""
     s, e = _two_sum(a[0], b[0])
@@ -103,27 +103,27 @@ def add(a: Number, b: Number) -> Number:
     return _fast_two_sum(s, e + f)
 
 
-@compiled
+@as_written
 def subtract(a: Number, b: Number) -> Number:
     """A - b."""
     return add(a, (-b[0], -b[1]))
 
 
-@compiled
+@as_written
 def multiply(a: Number, b: Number) -> Number:
     """A b."""
     p, e = _two_product(a[0], b[0])
     return _fast_two_sum(p, e + (a[0] * b[1] + a[1] * b[0]))
 
 
-@compiled
+@as_written
 def scale(a: Number, b: float) -> Number:
     """A b, where b is one double."""
     p, e = _two_product(a[0], b)
     return _fast_two_sum(p, e + a[1] * b)
 
 
-@compiled
+@as_written
 def divide(a: Number, b: Number) -> Number:
     """A / b, by long division."""
     q1 = a[0] / b[0]
@@ -133,7 +133,7 @@ def divide(a: Number, b: Number) -> Number:
     return add(_fast_two_sum(q1, q2), (rest[0] / b[0], 0.0))
 
 
-@compiled
+@as_written
 def _polynomial(coefficients: FloatArray, x: Number) -> Number:
     value = (coefficients[-1, 0], coefficients[-1, 1])
     for j in range(len(coefficients) - 2, -1, -1):
@@ -141,7 +141,7 @@ def _polynomial(coefficients: FloatArray, x: Number) -> Number:
     return value
 
 
-@compiled
+@as_written
 def sine_cosine(a: Number) -> tuple[Number, Number]:
     """Sin a and cos a, for |a| up to 1e9."""
     multiple = np.rint(a[0] * _PER_STEP)

@@ -18,6 +18,7 @@ from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault
 from pendbench.engines.registry import engine
 from pendbench.scene import Scene
+from pendbench.strict import input_error
 from pendbench.study import flags
 from pendbench.study.case import Case
 from pendbench.study.jobs import Job
@@ -42,6 +43,7 @@ from pendbench.trajectory import STATUSES
 Record = dict[str, Any]
 
 _ERROR_FLOOR: Final = 1e-13  # below it an error is rounding, and says nothing about an order
+_MOST_SAMPLES: Final = 1e6
 _ERROR_CEILING: Final = 0.03  # above it an error is no longer small, and says nothing either
 
 
@@ -73,6 +75,15 @@ def times_of(case: Case, sample: float) -> FloatArray:
         last = math.floor(case.scene.duration / case.dt + 1e-9)
         times = np.unique(np.minimum(np.rint(times / case.dt), last)) * case.dt
     return np.round(times, 12)
+
+
+def check(plan: Plan) -> None:
+    """Raise InputError where the samples would be too many, or too few to see anything."""
+    for scene in plan.scenes:
+        if not 1 <= scene.duration / plan.options.sample <= _MOST_SAMPLES:
+            low, high = scene.duration / _MOST_SAMPLES, scene.duration
+            allowed = f"{low:.3g} to {high:g} s, for the {high:g} s of scene {scene.name!r}"
+            raise input_error(plan.where, f"sample is {plan.options.sample:g}; allowed: {allowed}")
 
 
 def run(plan: Plan, runner: Runner) -> Results:
@@ -119,6 +130,8 @@ class _Chaos:
             for index, start in enumerate(starts):
                 key = key_of("truth", start.digest, times.tobytes())
                 job = Job(key, measure_truth, (start, times, self.runner.store, key), self.options.time_limit)
+                if self.runner.store.load_arrays(key) is None:
+                    self.runner.store.forget(key)
                 jobs.append(job)
                 owners[name, index] = job.key
         exponents = {
@@ -282,7 +295,7 @@ class _Chaos:
         timing = self.timings.get(case, {})
         for name in ("step_us", "step_spread", "simulated_s_per_s", "build_s", "first_call_s", "run_s"):
             row[name] = timing.get(name)
-        row["flags"] = "; ".join(flags.of_row(row, causes, timing))
+        row["flags"] = "; ".join(flags.of_row(own, causes, timing))
         return {name: math.nan if value is None else value for name, value in row.items()}
 
     def _divergence(self, scene: str, runs: list[Record]) -> Record:

@@ -23,6 +23,7 @@ from pendbench.engines.protocol import Fault
 from pendbench.errors import InputError, describe
 
 _STOPPING_S: Final = 0.5  # how long a worker has to end by itself; it holds nothing that could be lost
+_NO_WORKERS: Final = "the worker processes died as they started; what was finished is kept"
 
 
 @dataclass(frozen=True)
@@ -99,9 +100,6 @@ class LocalPool:
             return self._pool.schedule(_call, args=(packed,), timeout=job.time_limit)
         except RuntimeError:
             raise InputError(_NO_WORKERS) from None
-
-
-_NO_WORKERS: Final = "the worker processes died as they started; what was finished is kept"
 
 
 @contextmanager

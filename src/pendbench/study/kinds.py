@@ -19,6 +19,7 @@ class Kind(Protocol):
     """What a kind's module offers."""
 
     Options: type[StudyFile]
+    check: Callable[[Plan], None]  # raises InputError, one line, for what only the kind can see
     run: Callable[[Plan, Runner], Results]
 
 

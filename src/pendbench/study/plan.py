@@ -9,21 +9,22 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator, ConfigDict, Field
 
 from pendbench.bundled import bundled, bundled_names
-from pendbench.engines.protocol import Engine, Method
+from pendbench.engines.protocol import Method
 from pendbench.engines.registry import engine
 from pendbench.errors import InputError, choose, printable
-from pendbench.scene import Scene, load_scene
+from pendbench.scene import Range, Scene, load_scene
 from pendbench.scene_file import Table
 from pendbench.strict import input_error, read_toml, show, shown_path, validate
 from pendbench.study.case import Case
 from pendbench.study.kinds import KINDS, kind
 
-Step = Annotated[float, Field(gt=0, le=1e3, allow_inf_nan=False)]
+_STEP: Final = Range(1e-6, 1e3, "s")  # times are told apart to 1e-12 s
+_MOST_STEPS: Final = 1e12
 
 
 def _one_line(text: str) -> str:
@@ -39,7 +40,7 @@ class EngineTable(Table):
 
     name: str
     methods: Annotated[list[str], Field(min_length=1)]
-    dt: list[Step] = []
+    dt: Annotated[list[Annotated[float, _STEP]], Field(min_length=1)] | None = None
 
 
 class StudyFile(Table):
@@ -75,7 +76,10 @@ class Plan:
 
 def find_study(path_or_name: str | os.PathLike[str]) -> Path:
     """The file of a study: a path where it looks like one, the name of a bundled study otherwise."""
-    text = os.fsdecode(path_or_name)
+    try:
+        text = os.fsdecode(path_or_name)
+    except TypeError:
+        raise InputError(f"{show(path_or_name)} is neither the name of a study nor a path") from None
     if text.lower().endswith(".toml") or "/" in text or os.sep in text:
         return Path(text)
     if text not in bundled_names("studies"):
@@ -93,41 +97,57 @@ def load_plan(path_or_name: str | os.PathLike[str], *, quick: bool = False, engi
     where = shown_path(path)
     data = read_toml(path)
     name = data.get("kind", "chaos")
-    if name not in KINDS:
-        raise input_error(where, choose("kind", name if isinstance(name, str) else show(name), KINDS))
-    model = kind(name).Options
-    validate(model, data, where)
-    overlay = data.get("quick", {}) if quick else {}
-    if "quick" in overlay or "kind" in overlay:
-        raise input_error(f"{where} [quick]", "a quick study cannot change 'kind' or 'quick'")
-    options = validate(model, {**data, **overlay}, f"{where} [quick]" if overlay else where)
-    scenes = tuple(load_scene(scene, relative_to=path.parent) for scene in options.scenes)
-    _distinct(where, [scene.name for scene in scenes])
+    if not isinstance(name, str) or name not in KINDS:
+        raise input_error(where, choose("kind", printable(name[:60]) if isinstance(name, str) else show(name), KINDS))
+    its = kind(name)
+    options = validate(its.Options, data, where)
+    overlay = data.get("quick", {})
+    if fixed := {"quick", "kind"} & set(overlay):
+        raise input_error(f"{where} [quick]", f"a quick study cannot change {min(fixed)!r}")
+    changed = validate(its.Options, {**data, **overlay}, f"{where} [quick]")
+    if quick:
+        where, options = f"{where} [quick]", changed
+    scenes = tuple(_scenes(where, options.scenes, path.parent))
     cases = tuple(_cases(where, scenes, _selected(where, options.engines, engines)))
-    return Plan(printable(path.stem), where, options, scenes, cases, quick)
+    plan = Plan(printable(path.stem), where, options, scenes, cases, quick)
+    its.check(plan)
+    return plan
 
 
-def _distinct(where: str, names: list[str]) -> None:
-    for name in names:
-        if names.count(name) > 1:
-            raise input_error(where, f"scenes names {name!r} twice; allowed: each name once")
+def _scenes(where: str, names: Sequence[str], folder: Path) -> Iterator[Scene]:
+    seen = set()
+    for number, name in enumerate(names, 1):
+        try:
+            scene = load_scene(name, relative_to=folder)
+        except InputError as error:
+            raise input_error(f"{where}: scenes, entry {number}", str(error)) from None
+        if scene.name in seen:
+            raise input_error(where, f"scenes has {scene.name!r} twice; allowed: each name once")
+        seen.add(scene.name)
+        yield scene
 
 
 def _selected(where: str, tables: list[EngineTable], only: Sequence[str]) -> list[EngineTable]:
     known = {table.name for table in tables}
     for name in only:
         if name not in known:
-            raise InputError(f"--engines: {choose('engine', printable(name), known)} (the engines of {where})")
+            raise InputError(f"--engines: {choose('engine', printable(str(name)), known)} (the engines of {where})")
     return [table for table in tables if not only or table.name in only]
 
 
 def _cases(where: str, scenes: Sequence[Scene], tables: Sequence[EngineTable]) -> Iterator[Case]:
+    loaded = [(f"{where} [engines number {number}]", table) for number, table in enumerate(tables, 1)]
+    variants = [(at, table.name, list(_variants(at, table))) for at, table in loaded]
     seen = set()
-    for scene, (number, table) in itertools.product(scenes, enumerate(tables, 1)):
-        for arguments in _variants(f"{where} [engines number {number}]", table, engine(table.name)):
-            case = Case(scene, table.name, *arguments)
+    for scene, (at, name, arguments) in itertools.product(scenes, variants):
+        for method, dt, settings in arguments:
+            case = Case(scene, name, method, dt, settings)
             if (scene.name, *case.content) in seen:
-                raise input_error(where, f"asks twice for {case}")
+                raise input_error(at, f"asks twice for {case}")
+            if dt is not None and not 1 <= scene.duration / dt <= _MOST_STEPS:
+                least, most = scene.duration / _MOST_STEPS, scene.duration
+                allowed = f"{least:.3g} to {most:g} s, for the {most:g} s of scene {scene.name!r}"
+                raise input_error(at, f"dt is {dt:g}; allowed: {allowed}")
             seen.add((scene.name, *case.content))
             yield case
 
@@ -135,20 +155,27 @@ def _cases(where: str, scenes: Sequence[Scene], tables: Sequence[EngineTable]) -
 Variant = tuple[str, float | None, tuple[tuple[str, float], ...]]
 
 
-def _variants(where: str, table: EngineTable, its: Engine) -> Iterator[Variant]:
-    methods = {name: its.methods[name] for name in table.methods if name in its.methods}
+def _variants(where: str, table: EngineTable) -> Iterator[Variant]:
+    """The methods of an engine's table, with each step and each choice of settings."""
+    try:
+        its = engine(table.name)
+    except InputError as error:
+        raise input_error(where, str(error)) from None
     for name in table.methods:
         if name not in its.methods:
             raise input_error(where, choose("method", printable(name), its.methods))
+    methods = [(name, its.methods[name]) for name in table.methods]
     settings = table.model_extra or {}
-    known = sorted({setting for method in methods.values() for setting in method.settings})
+    known = sorted({setting for _, method in methods for setting in method.settings})
     for setting in settings:
         if setting not in known:
             raise input_error(where, choose("key", printable(setting), ["name", "methods", "dt", *known]))
-    for name, method in methods.items():
-        steps: list[float | None] = [None] if method.adaptive else list(table.dt)
-        if not steps:
+    if table.dt and all(method.adaptive for _, method in methods):
+        raise input_error(where, f"dt is given; allowed: no dt, since method {methods[0][0]!r} chooses its steps")
+    for name, method in methods:
+        if not method.adaptive and table.dt is None:
             raise input_error(where, f"missing key 'dt': method {name!r} needs a list of steps, s")
+        steps: list[float | None] = [None] if method.adaptive else list(table.dt or [])
         lists = [_values(where, key, settings[key], method) for key in sorted(method.settings) if key in settings]
         for dt, chosen in itertools.product(steps, itertools.product(*lists)):
             yield name, dt, chosen
@@ -158,9 +185,9 @@ def _values(where: str, key: str, values: Any, method: Method) -> list[tuple[str
     setting = method.settings[key]
     whole = " whole" if setting.integer else ""
     allowed = f"a{whole} number, or a list of them, from {setting.low:g} to {setting.high:g}"
-    chosen = values if isinstance(values, list) else [values]
-    for value in chosen or [None]:
+    chosen = values if isinstance(values, list) and values else [values]
+    for value in chosen:
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not setting.low <= value <= setting.high or (setting.integer and value != int(value)):
             raise input_error(where, f"{key} is {show(value)}; allowed: {allowed}")
-    return [(key, value) for value in chosen]
+    return [(key, int(value) if setting.integer else float(value)) for value in chosen]

@@ -45,16 +45,18 @@ class Runner:
         """The value of each job by its key. `on_fault` says what stands for a job that did not return; alone: one job
         at a time, for timings.
 
-        Values are of JSON's types. Faults are kept as well, but for time limits: a slow day should not stay on record.
+        Values are of JSON's types. What stands for a fault is not kept: a slow day, a full disk or too little memory
+        should not stay on record, and a fault of the engine's own comes back the next time.
         """
         values = {job.key: value for job in jobs if (value := self.store.load(job.key)) is not None}
         waiting = [job for job in jobs if job.key not in values]
         self.watcher.begin(stage, len(jobs), len(values))
         for outcome in self.executor.run(waiting, alone=alone):
-            value = outcome.value if outcome.fault is None else on_fault(outcome.job, outcome.fault)
-            if outcome.fault is None or outcome.fault.status != "timed out":
-                self.store.save(outcome.job.key, value)
-            values[outcome.job.key] = value
+            if outcome.fault is None:
+                self.store.save(outcome.job.key, outcome.value)
+                values[outcome.job.key] = outcome.value
+            else:
+                values[outcome.job.key] = on_fault(outcome.job, outcome.fault)
             self.watcher.advance()
         return values
 

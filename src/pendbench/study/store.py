@@ -71,6 +71,10 @@ class Store:
         """Save arrays by name."""
         write_whole(self._path(key, "npz"), lambda file: np.savez(file, **arrays, **{_KEY: np.array(key)}))  # type: ignore[arg-type]
 
+    def forget(self, key: str) -> None:
+        """Forget the value that was saved under `key`, so that it is found again by running."""
+        self._path(key, "json").unlink(missing_ok=True)
+
     def clear(self) -> None:
         """Forget all of it. Files that are not the store's stay."""
         for path in self.folder.glob("*"):

@@ -32,6 +32,8 @@ _CURVE_POINTS: Final = 250
 _APART: Final = 1e-10
 _GROWTH_FROM: Final = 1e-12
 _GROWTH_TO: Final = 1e-2
+#: From how many samples on it tells something that all are the truth to the last bit: the first few of a good method are.
+_TELLING: Final = 16
 
 
 #: Kernels that a study needs, each with what compiles it: once on a machine, and side by side.
@@ -100,12 +102,15 @@ def measure_timing(case: Case, until: float) -> Record:
 def measure_run(
     case: Case, start: Scene, times: FloatArray, truth_key: str, store: Store, order_time: float, curve: bool
 ) -> Record:
-    """Run the case from `start` and compare it with the truth saved under `truth_key`."""
-    run = simulate(start, case.engine, case.method, case.dt, times, **dict(case.settings))
+    """Run the case from `start` and compare it with the truth saved under `truth_key`, whose times hold all of `times`.
+
+    Raises LookupError where that is not there.
+    """
     truth = store.load_arrays(truth_key)
     if truth is None:
-        return failed_run(Fault("error", "no truth to compare with"))
-    at = np.searchsorted(truth["t"], times - 1e-9)
+        raise LookupError("no truth to compare with")
+    run = simulate(start, case.engine, case.method, case.dt, times, **dict(case.settings))
+    at = np.searchsorted(truth["t"], times)
     inside = at < len(truth["t"])
     compared, at = times[inside], at[inside]
     error, angle = _errors(start, run, truth, at)
@@ -118,6 +123,7 @@ def measure_run(
         "reason": run.reason,
         "steps": run.steps,
         "error_max": _largest(error),
+        "too_good": _too_good(run, truth, at),
         "error_half": upto,
         "reference_error_half": _largest(truth["disagreement"][at[half]]),
         "angle_error_max_rad": _largest(angle),
@@ -141,6 +147,16 @@ def _errors(scene: Scene, run: Trajectory, truth: dict[str, FloatArray], at: Any
     offset = (run.theta[: len(at)] - truth["theta"][at]) - truth["theta_low"][at]
     angle = np.abs(wrapped(offset)).max(axis=1, initial=0.0)
     return distance(scene.lengths, truth["theta"][at], offset), angle
+
+
+def _too_good(run: Trajectory, truth: dict[str, FloatArray], at: Any) -> str:
+    """What no honest run can do, in words: take no steps, or stay on the truth to the last bit; empty for most runs."""
+    at = at[: len(run.t)]
+    if run.steps is not None and run.steps < np.count_nonzero(run.t):
+        return f"{run.steps} steps to {np.count_nonzero(run.t)} different times"
+    offset = (run.theta[: len(at)] - truth["theta"][at]) - truth["theta_low"][at]
+    rounding = 0.5 * np.spacing(np.abs(truth["theta"][at]))
+    return "the truth, to the last bit" if len(at) >= _TELLING and np.all(np.abs(offset) <= rounding) else ""
 
 
 def _divergence(t: FloatArray, error: FloatArray) -> Record:
