@@ -6,15 +6,15 @@ horizon, where chaos has not yet made numbers of rounding.
 
 from __future__ import annotations
 
-import math
+import warnings
 from pathlib import Path
 from typing import Final
 
 import pandas as pd
 
-from pendbench.errors import InputError
+from pendbench.errors import choose, describe, printable
 from pendbench.files import write_whole
-from pendbench.strict import shown_path
+from pendbench.strict import input_error, shown_path
 from pendbench.trajectory import STATUSES
 
 _KEYS: Final = ("scene", "engine", "method", "dt", "settings")
@@ -39,15 +39,28 @@ def write_baseline(path: Path, cases: pd.DataFrame) -> None:
 
 def read_baseline(path: Path) -> pd.DataFrame:
     """A baseline from its file. Raises `InputError`, one line, where it is missing or is none."""
+    where = shown_path(path)
     try:
-        table = pd.read_csv(path, keep_default_na=True, dtype=dict.fromkeys(("settings", "scene", "status"), str))
+        return _read(path)
     except FileNotFoundError:
-        raise InputError(f"{shown_path(path)}: no baseline to check against; --update-baseline writes one") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{shown_path(path)}: not a baseline: {str(error).splitlines()[0][:120]}") from None
-    missing = [name for name in (*_KEYS, "status") if name not in table]
-    if missing:
-        raise InputError(f"{shown_path(path)}: not a baseline: column {missing[0]!r} is missing")
+        raise input_error(where, "no baseline to check against; --update-baseline writes one") from None
+    except (OSError, ValueError, pd.errors.ParserWarning) as error:
+        raise input_error(where, f"not a baseline: {describe(error)}") from None
+
+
+def _read(path: Path) -> pd.DataFrame:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)  # lines longer than the heading
+        table = pd.read_csv(path, dtype=str, keep_default_na=False, index_col=False)
+    for name in (*_KEYS, "status"):
+        if name not in table:
+            raise ValueError(f"column {name!r} is missing")
+    for name in ("dt", *_FLOORS):
+        if name in table:
+            table[name] = pd.to_numeric(table[name].replace("", "nan"))
+    for status in table["status"]:
+        if status not in STATUSES:
+            raise ValueError(choose("status", printable(str(status)), STATUSES))
     return table
 
 
@@ -81,16 +94,15 @@ def regressions(cases: pd.DataFrame, baseline: pd.DataFrame) -> list[str]:
 
 
 def _worse(name: str, before: pd.Series, now: pd.Series) -> list[str]:
-    found = []
     ranks = list(STATUSES)
-    known = before["status"] if before["status"] in ranks else "ok"
-    if ranks.index(now["status"]) > ranks.index(known):
-        found.append(f"{name}: status was '{before['status']}', is '{now['status']}' ({now['reason']})")
+    if ranks.index(now["status"]) > ranks.index(before["status"]):
+        return [f"{name}: status was '{before['status']}', is '{now['status']}' ({now['reason']})"]
+    found = []
     for column, floor in _FLOORS.items():
         if column not in before or column not in now or pd.isna(before[column]):
             continue
         allowed = max(_BAND * float(before[column]), floor)
         value = float(now[column])
-        if math.isnan(value) or value > allowed:
+        if not value <= allowed:
             found.append(f"{name}: {column} was {before[column]:.3g}, is {value:.3g}; allowed up to {allowed:.3g}")
     return found

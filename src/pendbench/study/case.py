@@ -6,6 +6,13 @@ from dataclasses import dataclass
 
 from pendbench.scene import Scene
 
+Settings = tuple[tuple[str, float], ...]
+
+
+def settings_text(settings: Settings) -> str:
+    """Settings as ``iterations=50``, joined by spaces."""
+    return " ".join(f"{name}={value:g}" for name, value in settings)
+
 
 @dataclass(frozen=True)
 class Case:
@@ -15,12 +22,12 @@ class Case:
     engine: str
     method: str
     dt: float | None
-    settings: tuple[tuple[str, float], ...] = ()
+    settings: Settings = ()
 
     @property
     def settings_text(self) -> str:
         """The settings as ``iterations=50``, joined by spaces."""
-        return " ".join(f"{name}={value:g}" for name, value in self.settings)
+        return settings_text(self.settings)
 
     @property
     def content(self) -> tuple[object, ...]:

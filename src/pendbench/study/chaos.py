@@ -15,28 +15,25 @@ import pandas as pd
 from pydantic import Field
 
 from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import Fault
 from pendbench.engines.registry import engine
 from pendbench.scene import Scene
 from pendbench.strict import input_error
 from pendbench.study import flags
+from pendbench.study.ask import refusal, version
 from pendbench.study.case import Case
 from pendbench.study.jobs import Job
 from pendbench.study.measure import OrderFit, observed_order
 from pendbench.study.plan import Plan, StudyFile
 from pendbench.study.results import Results
 from pendbench.study.runner import Runner, distinct
-from pendbench.study.store import key_of
+from pendbench.study.stages import compile_kernels, fault_record, job_of, truth_job
 from pendbench.study.work import (
-    KERNELS,
     THRESHOLDS,
-    compile_kernel,
     failed_run,
     measure_exponent,
     measure_model,
     measure_run,
     measure_timing,
-    measure_truth,
 )
 from pendbench.trajectory import STATUSES
 
@@ -104,23 +101,19 @@ class _Chaos:
         self.runs: dict[tuple[Case, int], Record] = {}
         self.models: dict[Case, Record] = {}
         self.timings: dict[Case, Record] = {}
-        self.accepted = [case for case in plan.cases if engine(case.engine).refuses(case.scene) is None]
+        self.refusals = {case: refusal(case) for case in plan.cases}
+        self.accepted = [case for case in plan.cases if self.refusals[case] is None]
 
     def measure(self) -> None:
         """Run what the study asks for."""
-        self._compile()
+        compile_kernels(self.runner, self.plan.scenes[0], self.options.time_limit)
         self._measure_truths()
         self._measure_runs()
         self._measure_models()
         self._measure_timings()
 
     def _job(self, function: Any, depends_on: tuple[object, ...], *arguments: Any) -> Job:
-        return Job(key_of(function.__name__, *depends_on), function, arguments, self.options.time_limit)
-
-    def _compile(self) -> None:
-        scene = self.plan.scenes[0]
-        jobs = [self._job(compile_kernel, (name,), name, scene) for name in KERNELS]
-        self.runner.run("compiled kernels", jobs, lambda _, fault: _fault(fault))
+        return job_of(function, depends_on, self.options.time_limit, *arguments)
 
     def _measure_truths(self) -> None:
         jobs, owners = [], {}
@@ -128,10 +121,7 @@ class _Chaos:
             cases = [case for case in self.plan.cases if case.scene.name == name]
             times = np.unique(np.concatenate([times_of(case, self.options.sample) for case in cases]))
             for index, start in enumerate(starts):
-                key = key_of("truth", start.digest, times.tobytes())
-                job = Job(key, measure_truth, (start, times, self.runner.store, key), self.options.time_limit)
-                if self.runner.store.load_arrays(key) is None:
-                    self.runner.store.forget(key)
+                job = truth_job(start, times, self.runner.store, self.options.time_limit)
                 jobs.append(job)
                 owners[name, index] = job.key
         exponents = {
@@ -141,7 +131,7 @@ class _Chaos:
             for scene in self.plan.scenes
         }
         stage = distinct([*jobs, *exponents.values()])
-        found = self.runner.run("the truth", stage, lambda _, fault: _fault(fault))
+        found = self.runner.run("the truth", stage, lambda _, fault: fault_record(fault))
         self.truths = {owner: {**found[key], "key": key} for owner, key in owners.items()}
         self.exponents = {name: found[job.key] for name, job in exponents.items()}
 
@@ -149,10 +139,16 @@ class _Chaos:
         jobs, owners = [], {}
         for case in self.accepted:
             times = times_of(case, self.options.sample)
-            version = engine(case.engine).version()
             for index, start in enumerate(self.starts[case.scene.name]):
                 truth = self.truths[case.scene.name, index]["key"]
-                content = (start.digest, *case.content[1:], version, truth, self.options.order_time, index == 0)
+                content = (
+                    start.digest,
+                    *case.content[1:],
+                    version(case.engine),
+                    truth,
+                    self.options.order_time,
+                    index == 0,
+                )
                 arguments = (case, start, times, truth, self.runner.store, self.options.order_time, index == 0)
                 job = self._job(measure_run, content, *arguments)
                 jobs.append(job)
@@ -163,19 +159,19 @@ class _Chaos:
     def _measure_models(self) -> None:
         owners = {}
         for case in self.accepted:
-            content = (case.scene.digest, case.engine, case.method, case.settings, engine(case.engine).version())
+            content = (case.scene.digest, case.engine, case.method, case.settings, version(case.engine))
             owners[case] = self._job(measure_model, (*content, self.options.seed), case, self.options.seed)
-        found = self.runner.run("the causes", distinct(owners.values()), lambda _, fault: _fault(fault))
+        found = self.runner.run("the causes", distinct(owners.values()), lambda _, fault: fault_record(fault))
         self.models = {case: found[job.key] for case, job in owners.items()}
 
     def _measure_timings(self) -> None:
         owners = {}
         for case in self.accepted:
             until = self.truths[case.scene.name, 0].get("horizon") or case.scene.duration
-            content = (*case.content, until, engine(case.engine).version())
+            content = (*case.content, until, version(case.engine))
             owners[case] = self._job(measure_timing, content, case, until)
         found = self.runner.run(
-            "the clock, one at a time", distinct(owners.values()), lambda _, fault: _fault(fault), alone=True
+            "the clock, one at a time", distinct(owners.values()), lambda _, fault: fault_record(fault), alone=True
         )
         self.timings = {case: found[job.key] for case, job in owners.items()}
 
@@ -278,7 +274,7 @@ class _Chaos:
             "method": case.method,
             "dt": math.nan if case.dt is None else case.dt,
             "settings": case.settings_text,
-            **_ending(runs, engine(case.engine).refuses(case.scene), truth),
+            **_ending(runs, self.refusals[case], truth),
             "horizon_s": truth.get("horizon", math.nan),
             "reference_error": truth.get("error", math.nan),
         }
@@ -295,7 +291,7 @@ class _Chaos:
         timing = self.timings.get(case, {})
         for name in ("step_us", "step_spread", "simulated_s_per_s", "build_s", "first_call_s", "run_s"):
             row[name] = timing.get(name)
-        row["flags"] = "; ".join(flags.of_row(own, causes, timing))
+        row["flags"] = "; ".join(flags.of_row(own, causes, self.models.get(case, {}), timing))
         return {name: math.nan if value is None else value for name, value in row.items()}
 
     def _divergence(self, scene: str, runs: list[Record]) -> Record:
@@ -358,10 +354,6 @@ class _Chaos:
 
 def _method_key(case: Case) -> tuple[object, ...]:
     return case.scene.name, case.engine, case.method, case.settings
-
-
-def _fault(fault: Fault) -> Record:
-    return {"status": fault.status, "reason": fault.reason}
 
 
 def _median(reached: list[float], total: int) -> float:

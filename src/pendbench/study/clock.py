@@ -13,6 +13,8 @@ from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation
 from pendbench.scene import Scene
 
 REPEATS = 5
+_LOOKS = 200
+_MOST_RUNS = 100  # that are put together for one sample, where each is short
 _SAMPLE_S = 0.01  # a sample shorter than this is mostly the clock's own noise
 
 
@@ -32,33 +34,40 @@ class Timing(NamedTuple):
 
 
 def _fixed(engine: Engine, scene: Scene, method: str, dt: float, settings: dict[str, float], until: float) -> Timing:
+    """Samples of steps inside the time that is asked about: past it a run may have failed, and failing is quick."""
+
     def build() -> Simulation:
         simulation = engine.build(scene, method, dt, **settings)
         assert isinstance(simulation, Simulation)
         return simulation
 
+    total = max(1, round(until / dt))
     first = build()
     first_call = _seconds(partial(first.advance, 1))
-    steps = _enough_steps(build())
+    steps = _steps_of_sample(build(), total)
     samples, builds = [], []
     for _ in range(REPEATS):
-        begun = time.perf_counter()
-        simulation = build()
-        builds.append(time.perf_counter() - begun)
-        simulation.advance(1)
-        samples.append(_seconds(partial(simulation.advance, steps)) / steps)
+        spent, taken = 0.0, 0
+        while spent < _SAMPLE_S and taken < _MOST_RUNS * steps:
+            begun = time.perf_counter()
+            simulation = build()
+            builds.append(time.perf_counter() - begun)
+            spent += _seconds(partial(simulation.advance, steps))
+            taken += steps
+        samples.append(spent / taken)
     median = float(np.median(samples))
     spread = float(np.ptp(samples)) / median
-    return Timing(median * 1e6, spread, steps, float(np.median(builds)), first_call, median * round(until / dt))
+    return Timing(median * 1e6, spread, taken, float(np.median(builds)), first_call, median * total)
 
 
-def _enough_steps(simulation: Simulation) -> int:
-    """How many steps fill a sample."""
-    simulation.advance(1)
-    steps = 8
-    while (taken := _seconds(partial(simulation.advance, steps))) < _SAMPLE_S / 4 and steps < 1 << 24:
+def _steps_of_sample(simulation: Simulation, most: int) -> int:
+    """How many of a run's steps fill a sample."""
+    taken, steps, spent = 0, 1, 0.0
+    while taken + steps <= most and spent < _SAMPLE_S / 4:
+        spent = _seconds(partial(simulation.advance, steps))
+        taken += steps
         steps *= 2
-    return max(1, round(steps * _SAMPLE_S / max(taken, 1e-9)))
+    return max(1, min(most, round(steps / 2 * _SAMPLE_S / max(spent, 1e-9))))
 
 
 def _adaptive(engine: Engine, scene: Scene, method: str, settings: dict[str, float], until: float) -> Timing:
@@ -93,3 +102,23 @@ def time_case(
     if dt is None:
         return _adaptive(engine, scene, method, settings, until)
     return _fixed(engine, scene, method, dt, settings, until)
+
+
+def time_each_step(
+    engine: Engine, scene: Scene, method: str, dt: float | None, settings: dict[str, float], interval: float
+) -> float:
+    """The median cost, us, of one step and one look at the state, from Python.
+
+    For a method that chooses its steps: of advancing by `interval` (s) and one look, since that is what is asked of it.
+    """
+    simulation = engine.build(scene, method, dt, **settings)
+    samples = []
+    for i in range(_LOOKS):
+        begun = time.perf_counter()
+        if isinstance(simulation, Simulation):
+            simulation.advance(1)
+        else:
+            simulation.advance_to((i + 1) * interval)
+        simulation.state()
+        samples.append(time.perf_counter() - begun)
+    return float(np.median(samples[_LOOKS // 10 :])) * 1e6

@@ -35,8 +35,14 @@ def cause(causes: Mapping[str, Any]) -> str:
     return "integration, amplified by chaos" if math.isfinite(causes["lyapunov_per_s"]) else "integration"
 
 
-def of_row(run: Mapping[str, Any], causes: Mapping[str, Any], timing: Mapping[str, Any]) -> Iterator[str]:
-    """The flags of one row: of the run from the scene's own start, of what its method's steps showed, of its timing."""
+def of_row(
+    run: Mapping[str, Any], causes: Mapping[str, Any], model: Mapping[str, Any], timing: Mapping[str, Any]
+) -> Iterator[str]:
+    """The flags of one row.
+
+    run: from the scene's own start. causes: of all steps of its method. model, timing: what was measured of them, or
+    the status and reason of not being measured.
+    """
     if another_system(causes):
         yield f"another system: accelerations differ by {causes['model_error']:.1e}"
     if order_differs(causes):
@@ -47,12 +53,37 @@ def of_row(run: Mapping[str, Any], causes: Mapping[str, Any], timing: Mapping[st
         yield f"too good: {good}"
     if timing.get("step_spread", 0.0) > SPREAD_LIMIT:
         yield f"noisy timing: spread {timing['step_spread']:.0%}"
+    if "status" in model:
+        yield f"model not compared: {model['status']}, {model['reason']}"
+    if "status" in timing:
+        yield f"not timed: {timing['status']}, {timing['reason']}"
+
+
+def of_priced_row(run: Mapping[str, Any], order: Mapping[str, Any], timing: Mapping[str, Any]) -> Iterator[str]:
+    """The flags of a row of a study of cost: of its run, of what the steps of its method showed, of its timing."""
+    error, known = run.get("error_max"), run.get("reference_error")
+    if order_differs(order):
+        yield f"order {order['order_observed']:.1f} where {order['order_claimed']} is claimed"
+    if math.isfinite(order["plateau"]):
+        yield f"plateau: the error stops at {order['plateau']:.1e}"
+    if error == 0.0:
+        yield "too good: no error at all"
+    elif error is not None and known is not None and error < 10 * known:
+        yield "too good: as near to the reference as that is known"
+    elif run.get("too_good"):
+        yield f"too good: {run['too_good']}"
+    yield from _of_timing(timing)
+
+
+def _of_timing(timing: Mapping[str, Any]) -> Iterator[str]:
+    if timing.get("step_spread", 0.0) > SPREAD_LIMIT:
+        yield f"noisy timing: spread {timing['step_spread']:.0%}"
     if "status" in timing:
         yield f"not timed: {timing['status']}, {timing['reason']}"
 
 
 def _too_good(run: Mapping[str, Any]) -> str:
-    """In double precision no engine comes as near to the truth as that is known, and none stays on it to the last bit."""
+    """No engine comes as near to the truth as that is known, in double precision, or stays on it to the last bit."""
     if run.get("error_max") == 0.0:
         return "no error at all"
     half, known = run.get("error_half"), run.get("reference_error_half")

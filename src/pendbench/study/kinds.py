@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pendbench.study.runner import Runner
 
 #: Names of kinds, each with its module.
-KINDS: Final = {"chaos": "pendbench.study.chaos"}
+KINDS: Final = {"chaos": "pendbench.study.chaos", "cost": "pendbench.study.cost"}
 
 
 class Kind(Protocol):

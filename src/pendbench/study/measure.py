@@ -123,3 +123,49 @@ def _order(h: FloatArray, e: FloatArray, i: int) -> float:
 
 def _confirmed(orders: Mapping[int, float], i: int) -> bool:
     return orders[i] > 0.75 * max(orders.values()) or abs(orders[i] - orders.get(i - 1, math.inf)) <= _SAME
+
+
+class Price(NamedTuple):
+    """What an accuracy costs: run_s of stepping with this step (or tolerance), nan where it was not reached.
+
+    best: the smallest error there was. bound: whether already the coarsest step was that good, so that the price is an
+    upper bound.
+    """
+
+    run_s: float
+    step: float
+    best: float
+    bound: bool
+
+
+def price_of(accuracy: float, step: FloatArray, error: FloatArray, run_s: FloatArray) -> Price:
+    """The price of `accuracy` from points (j,) measured at different steps; nan among the errors: a run that failed.
+
+    Between two neighbouring steps of which the coarser misses the accuracy and the finer has it, by interpolation of
+    logarithms; never beyond what was measured.
+    """
+    by_step = np.argsort(step)[::-1]
+    h, e, cost = step[by_step], error[by_step], run_s[by_step]
+    finite = np.isfinite(e)
+    best = float(e[finite].min()) if finite.any() else math.nan
+    good = np.flatnonzero(e <= accuracy)
+    if not good.size:
+        return Price(math.nan, math.nan, best, bound=False)
+    i = int(good[0])
+    if i == 0 or not np.isfinite(e[i - 1]) or e[i] <= 0:
+        return Price(float(cost[i]), float(h[i]), best, bound=i == 0)
+    share = math.log(accuracy / e[i - 1]) / math.log(e[i] / e[i - 1])
+    between = [math.exp(math.log(v[i - 1]) + share * math.log(v[i] / v[i - 1])) for v in (cost, h)]
+    return Price(between[0], between[1], best, bound=False)
+
+
+def price_of_digit(error: FloatArray, run_s: FloatArray, floor: float, ceiling: float) -> float:
+    """By what factor the cost grows for one more digit: a line through log run_s against log error, between the two.
+
+    nan where there are not two such points, or where no cost brings the error down.
+    """
+    usable = np.isfinite(error) & (error > floor) & (error < ceiling)
+    if np.count_nonzero(usable) < 2 or np.ptp(np.log(error[usable])) < math.log(2):
+        return math.nan
+    slope = float(np.polyfit(-np.log10(error[usable]), np.log10(run_s[usable]), 1)[0])
+    return 10.0**slope if slope > 0 else math.nan

@@ -34,13 +34,17 @@ def _one_line(text: str) -> str:
 
 
 class EngineTable(Table):
-    """[[engines]]: a name, some of its methods, steps, and lists of values for the methods' settings."""
+    """[[engines]]: a name, some of its methods, steps, and lists of values for the methods' settings.
+
+    scenes: the names of those of the study's scenes that these are for; all of them by default.
+    """
 
     model_config = ConfigDict(extra="allow")
 
     name: str
     methods: Annotated[list[str], Field(min_length=1)]
     dt: Annotated[list[Annotated[float, _STEP]], Field(min_length=1)] | None = None
+    scenes: Annotated[list[str], Field(min_length=1)] | None = None
 
 
 class StudyFile(Table):
@@ -106,7 +110,7 @@ def load_plan(path_or_name: str | os.PathLike[str], *, quick: bool = False, engi
         raise input_error(f"{where} [quick]", f"a quick study cannot change {min(fixed)!r}")
     changed = validate(its.Options, {**data, **overlay}, f"{where} [quick]")
     if quick:
-        where, options = f"{where} [quick]", changed
+        where, options = f"{where} [quick]" if overlay else where, changed
     scenes = tuple(_scenes(where, options.scenes, path.parent))
     cases = tuple(_cases(where, scenes, _selected(where, options.engines, engines)))
     plan = Plan(printable(path.stem), where, options, scenes, cases, quick)
@@ -137,14 +141,21 @@ def _selected(where: str, tables: list[EngineTable], only: Sequence[str]) -> lis
 
 def _cases(where: str, scenes: Sequence[Scene], tables: Sequence[EngineTable]) -> Iterator[Case]:
     loaded = [(f"{where} [engines number {number}]", table) for number, table in enumerate(tables, 1)]
-    variants = [(at, table.name, list(_variants(at, table))) for at, table in loaded]
+    variants = [(at, table, list(_variants(at, table))) for at, table in loaded]
+    known = [scene.name for scene in scenes]
+    for at, table, _ in variants:
+        if unknown := [name for name in table.scenes or () if name not in known]:
+            raise input_error(at, f"scenes: {choose('scene', printable(unknown[0]), known)} (the study's scenes)")
     seen = set()
-    for scene, (at, name, arguments) in itertools.product(scenes, variants):
+    for scene, (at, table, arguments) in itertools.product(scenes, variants):
+        if table.scenes is not None and scene.name not in table.scenes:
+            continue
+        name = table.name
         for method, dt, settings in arguments:
             case = Case(scene, name, method, dt, settings)
             if (scene.name, *case.content) in seen:
                 raise input_error(at, f"asks twice for {case}")
-            if dt is not None and not 1 <= scene.duration / dt <= _MOST_STEPS:
+            if dt is not None and not 1 - 1e-9 <= scene.duration / dt <= _MOST_STEPS:
                 least, most = scene.duration / _MOST_STEPS, scene.duration
                 allowed = f"{least:.3g} to {most:g} s, for the {most:g} s of scene {scene.name!r}"
                 raise input_error(at, f"dt is {dt:g}; allowed: {allowed}")
@@ -169,7 +180,7 @@ def _variants(where: str, table: EngineTable) -> Iterator[Variant]:
     known = sorted({setting for _, method in methods for setting in method.settings})
     for setting in settings:
         if setting not in known:
-            raise input_error(where, choose("key", printable(setting), ["name", "methods", "dt", *known]))
+            raise input_error(where, choose("key", printable(setting), ["name", "methods", "dt", "scenes", *known]))
     if table.dt and all(method.adaptive for _, method in methods):
         raise input_error(where, f"dt is given; allowed: no dt, since method {methods[0][0]!r} chooses its steps")
     for name, method in methods:

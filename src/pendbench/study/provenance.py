@@ -8,7 +8,7 @@ from importlib import metadata
 from typing import Any
 
 from pendbench import __version__
-from pendbench.engines.registry import engine
+from pendbench.study.ask import version
 from pendbench.study.plan import Plan
 from pendbench.study.store import source_digest
 
@@ -31,7 +31,7 @@ def provenance(plan: Plan, workers: int) -> dict[str, Any]:
     return {
         "pendbench": __version__,
         "pendbench source": source_digest(),
-        **{f"engine {name}": engine(name).version() for name in names},
+        **{f"engine {name}": version(name) for name in names},
         **{name: metadata.version(name) for name in _LIBRARIES},
         "python": platform.python_version(),
         "operating system": platform.platform(),

@@ -16,7 +16,7 @@ from pendbench.recording import simulate
 from pendbench.scene import Scene
 from pendbench.study.case import Case
 from pendbench.study.causes import model_error
-from pendbench.study.clock import time_case
+from pendbench.study.clock import Timing, time_case, time_each_step
 from pendbench.study.lyapunov import lyapunov_exponent
 from pendbench.study.measure import drift, growth_rate, time_to
 from pendbench.study.store import Store
@@ -29,10 +29,11 @@ Record = dict[str, Any]
 THRESHOLDS: Final = (1e-3, 1e-2, 1e-1)
 
 _CURVE_POINTS: Final = 250
+_LONG_SAMPLES: Final = 20_000
 _APART: Final = 1e-10
 _GROWTH_FROM: Final = 1e-12
 _GROWTH_TO: Final = 1e-2
-#: From how many samples on it tells something that all are the truth to the last bit: the first few of a good method are.
+#: So many samples that are all the truth to the last bit tell something; the first few of a good method are, too.
 _TELLING: Final = 16
 
 
@@ -43,6 +44,8 @@ KERNELS: Final[dict[str, Callable[[Scene], object]]] = {
     "adaptive": lambda scene: simulate(scene, "analytic", "adaptive", times=[1e-9]),
     "rk4": lambda scene: simulate(scene, "analytic", "rk4", 1e-9, [1e-9]),
     "euler": lambda scene: simulate(scene, "analytic", "euler", 1e-9, [1e-9]),
+    "gauss": lambda scene: simulate(scene, "analytic", "gauss4", 1e-9, [1e-9]),
+    "rattle": lambda scene: simulate(scene, "analytic", "rattle", 1e-9, [1e-9]),
 }
 
 
@@ -88,7 +91,18 @@ def measure_model(case: Case, seed: int) -> Record:
 
 def measure_timing(case: Case, until: float) -> Record:
     """What the case costs."""
-    found = time_case(engine(case.engine), case.scene, case.method, case.dt, dict(case.settings), until)
+    return _timing(time_case(engine(case.engine), case.scene, case.method, case.dt, dict(case.settings), until), until)
+
+
+def measure_cost_timing(case: Case, until: float, interval: float) -> Record:
+    """The same, and what a step costs a caller who asks for the state after every one (or every `interval` s)."""
+    its, settings = engine(case.engine), dict(case.settings)
+    timing = _timing(time_case(its, case.scene, case.method, case.dt, settings, until), until)
+    each = time_each_step(its, case.scene, case.method, case.dt, settings, interval)
+    return {**timing, "step_and_state_us": each}
+
+
+def _timing(found: Timing, until: float) -> Record:
     return {
         "step_us": found.step_us,
         "step_spread": found.spread,
@@ -134,6 +148,57 @@ def measure_run(
     if curve:
         record["curve"] = _curve(start, run, error)
     return record
+
+
+def measure_error(case: Case, times: FloatArray, truth_key: str, store: Store) -> Record:
+    """Run the case up to the last of `times` and compare it with the truth saved under `truth_key`.
+
+    Raises LookupError where that is not there.
+    """
+    truth = store.load_arrays(truth_key)
+    if truth is None:
+        raise LookupError("no truth to compare with")
+    run = simulate(case.scene, case.engine, case.method, case.dt, times, **dict(case.settings))
+    at = np.searchsorted(truth["t"], times - 1e-9)
+    if at[-1] >= len(truth["t"]):
+        return failed_run(Fault("error", "the reference's horizon comes before the time that is compared"))
+    error, angle = _errors(case.scene, run, truth, at)
+    whole = run.status == "ok"
+    return {
+        "status": run.status,
+        "reason": run.reason,
+        "steps": run.steps,
+        "error_max": _largest(error) if whole else None,
+        "angle_error_max_rad": _largest(angle) if whole else None,
+        "reference_error": _largest(truth["disagreement"][at]),
+        "energy_drift_max": _energies(case.scene, run, float(times[-1]))["energy_drift_max"],
+        "gap_max": _largest(run.gap),
+        "too_good": _too_good(run, truth, at),
+    }
+
+
+def measure_long_run(case: Case, steps: int) -> Record:
+    """Take `steps` steps and see what the energy does: over all of them, and in the first and the last tenth."""
+    stride = max(1, steps // _LONG_SAMPLES)
+    times = np.arange(0, steps + 1, stride) * (case.dt or 0.0)
+    run = simulate(case.scene, case.engine, case.method, case.dt, times, **dict(case.settings))
+    with np.errstate(over="ignore"):
+        values, scale = energy(case.scene, run.theta, run.omega), energy_scale(case.scene)
+    k = len(values)
+    whole, tenth = drift(run.t, values, scale), max(1, k // 10)
+    first, last = drift(run.t[:tenth], values[:tenth], scale), drift(run.t[-tenth:], values[-tenth:], scale)
+    return {
+        "status": run.status,
+        "reason": run.reason,
+        "steps": run.steps,
+        "energy_drift_max": whole.largest,
+        "energy_drift_band": whole.band,
+        "energy_drift_slope_per_s": whole.slope,
+        "energy_slope_share": abs(whole.slope) * float(run.t[-1]) / whole.band if k > 1 and whole.band > 0 else None,
+        "energy_band_first_tenth": first.band,
+        "energy_band_last_tenth": last.band,
+        "curve": _curve(case.scene, run, np.zeros(0)),
+    }
 
 
 def failed_run(fault: Fault) -> Record:

@@ -1,0 +1,292 @@
+"""How fast and how exact the analytic engine is, against its targets. By hand: python benchmarks/accelerations.py
+
+Three tables in Markdown: what the accelerations of a chain cost, beside MuJoCo's in the same minute; how many digits
+they keep where masses and lengths make it hard; and what that comes to over the scenes of the study "chaos".
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+import mujoco
+import numba
+import numpy as np
+from scipy.linalg import LinAlgError
+
+import pendbench as pb
+from pendbench.arrays import FloatArray
+from pendbench.compiled import compiled
+from pendbench.engines.mjcf import compile_chain, joint_values, quiet
+from pendbench.physics import dense
+from pendbench.physics.energy import energy, energy_scale
+from pendbench.physics.geometry import distance
+from pendbench.physics.recursion import accelerations, system_of, write_accelerations
+from pendbench.physics.system import System
+from pendbench.scene import Scene
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
+from hard_chains import HARD, exact_accelerations, hard_chains, relative_error  # noqa: E402
+from scenes import chain  # noqa: E402
+
+SIZES = (2, 10, 50, 100, 1000, 10_000)
+MUJOCO_UP_TO = 1000  # links; its compiler refuses 1024
+# Short samples, and many: on a busy machine most of them are then spared, and the median is theirs.
+SAMPLE_S = 0.002
+REPEATS = 61
+NOISY = 0.1
+
+MOST_NS_PER_LINK = 45.0
+LEAST_SPEEDUP = 10.0
+LARGEST_ERROR = 1e-13
+LARGEST_DRIFT = 1e-12
+LARGEST_DISTANCE = 1e-10
+
+
+class Cost(NamedTuple):
+    """The median time of a call, s, and the spread of the samples: the middle half of them, over the median."""
+
+    call: float
+    spread: float
+
+    @property
+    def noise(self) -> str:
+        """The spread, and whether it is too large."""
+        return f"{self.spread:.0%}{' noisy' if self.spread > NOISY else ''}"
+
+
+def table(heads: list[str], rows: list[list[str]]) -> None:
+    """Print a table in Markdown, aligned for those who read it as it is."""
+    widths = [max(len(row[i]) for row in [heads, *rows]) for i in range(len(heads))]
+    for row in [heads, ["-" * width for width in widths], *rows]:
+        print("| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |", flush=True)
+    print()
+
+
+def verdict(found: float, *, most: float = np.inf, least: float = -np.inf) -> str:
+    """Whether a number keeps within its target."""
+    return "met" if least <= found <= most else "MISSED"
+
+
+@compiled
+def _accelerate(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray, times: int) -> None:
+    """Each call waits for the one before it, as the steps of a solver do."""
+    for _ in range(times):
+        write_accelerations(system, theta, omega, out)
+        theta[0] += 1e-15 * out[0]
+
+
+def ours(scene: Scene) -> Callable[[int], None]:
+    """That many calls of the recursion."""
+    system, theta, omega, out = system_of(scene), scene.angles.copy(), scene.rates.copy(), np.empty(scene.n)
+    return lambda times: _accelerate(system, theta, omega, out, times)
+
+
+def mujoco_data(scene: Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """The chain in MuJoCo, with all that it does not call for disabled."""
+    model = compile_chain(scene)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = joint_values(scene.angles), joint_values(scene.rates)
+    return model, data
+
+
+def theirs(scene: Scene) -> Callable[[int], None]:
+    """That many calls of MuJoCo's forward dynamics, from Python: there is no native call that makes several."""
+    model, data = mujoco_data(scene)
+
+    def forward(times: int) -> None:
+        for _ in range(times):
+            mujoco.mj_forward(model, data)
+
+    return forward
+
+
+def empty() -> Callable[[int], None]:
+    """The same for a model of nothing: what a call from Python costs before any work is done."""
+    model = mujoco.MjSpec().compile()
+    data = mujoco.MjData(model)
+
+    def forward(times: int) -> None:
+        for _ in range(times):
+            mujoco.mj_forward(model, data)
+
+    return forward
+
+
+def seconds(calls: Callable[[int], None], times: int) -> float:
+    """How long that many calls take. Both candidates have one thread, whose clock stops while others have its place."""
+    begun = time.thread_time()
+    calls(times)
+    return time.thread_time() - begun
+
+
+def costs(*candidates: Callable[[int], None]) -> list[Cost]:
+    """What a call of each costs: taken in turn, so that a busy minute strikes all of them."""
+    counts = []
+    for calls in candidates:
+        calls(1)
+        times = 1
+        while (taken := min(seconds(calls, times) for _ in range(3))) < SAMPLE_S / 8:
+            times *= 2
+        counts.append(max(1, round(times * SAMPLE_S / taken)))
+    samples: list[list[float]] = [[] for _ in candidates]
+    for _ in range(REPEATS):
+        for i, calls in enumerate(candidates):
+            samples[i].append(seconds(calls, counts[i]) / counts[i])
+    return [Cost(median(each), float(np.subtract(*np.quantile(each, (0.75, 0.25)))) / median(each)) for each in samples]
+
+
+def moving_chain(n: int) -> Scene:
+    """A chain of n links in disorder."""
+    rng = np.random.default_rng(n)
+    return chain(n, angle=rng.uniform(-np.pi, np.pi, n), rate=rng.uniform(-5.0, 5.0, n), mass=rng.uniform(0.5, 2.0, n))
+
+
+def speed_table() -> None:
+    """Cost of the accelerations."""
+    rows = []
+    for n in SIZES:
+        scene = moving_chain(n)
+        if n > MUJOCO_UP_TO:
+            [own] = costs(ours(scene))
+            beside = ["", "", "", ""]
+        else:
+            own, other, call = costs(ours(scene), theirs(scene), empty())
+            work = max(other.call - call.call, 0.0)
+            ratio = work / own.call
+            beside = [f"{work * 1e6:.2f}", other.noise, f"{ratio:.1f}", verdict(ratio, least=LEAST_SPEEDUP)]
+        link = own.call * 1e9 / n
+        rows.append(
+            [
+                str(n),
+                f"{own.call * 1e6:.3f}",
+                f"{link:.1f}",
+                f"{MOST_NS_PER_LINK:g}",
+                own.noise,
+                verdict(link, most=MOST_NS_PER_LINK),
+                *beside[:3],
+                f"{LEAST_SPEEDUP:g}" if beside[0] else "",
+                beside[3],
+            ]
+        )
+    print(f"### Cost of the accelerations (time of one thread, medians of {REPEATS} samples, in turn)\n")
+    heads = ["n", "us", "ns per link", "at most", "spread", "verdict"]
+    table([*heads, "MuJoCo, us", "spread", "ratio", "at least", "verdict"], rows)
+    print("MuJoCo: mj_forward, less the cost of the same call for a model of nothing.\n")
+
+
+def mujoco_accelerations(scene: Scene) -> FloatArray:
+    """The rods' angular accelerations (n,) as MuJoCo has them."""
+    with quiet():
+        model, data = mujoco_data(scene)
+        mujoco.mj_forward(model, data)
+    found: FloatArray = np.cumsum(data.qacc)
+    return found
+
+
+def worst_error(function: Callable[[Scene], FloatArray], cases: list[tuple[Scene, list]]) -> tuple[float, float]:
+    """The largest and the median error; inf where there is no result at all."""
+    errors = []
+    for scene, exact in cases:
+        try:
+            found = function(scene)
+        except LinAlgError:
+            errors.append(np.inf)
+        else:
+            errors.append(relative_error(found, exact) if np.isfinite(found).all() else np.inf)
+    return max(errors), median(errors)
+
+
+def error_table(seeds: int) -> None:
+    """Errors of the accelerations over the table of hard chains."""
+    rows = []
+    for kind in HARD:
+        cases = [(scene, exact_accelerations(scene)) for scene in hard_chains(kind, range(seeds))]
+        worst, middle = worst_error(lambda s: accelerations(s, s.angles, s.rates), cases)
+        with np.errstate(all="ignore"):
+            cholesky, _ = worst_error(lambda s: dense.accelerations(s, s.angles, s.rates), cases)
+            other, _ = worst_error(mujoco_accelerations, cases)
+        rows.append(
+            [
+                kind,
+                f"{worst:.1e}",
+                f"{middle:.1e}",
+                f"{LARGEST_ERROR:.0e}",
+                verdict(worst, most=LARGEST_ERROR),
+                f"{cholesky:.1e}",
+                f"{other:.1e}",
+            ]
+        )
+    print(f"### Relative error against 50 digits ({len(cases)} states each, n = 5 to 20; largest component)\n")
+    table(["masses and shape", "worst", "median", "at most", "verdict", "dense Cholesky", "MuJoCo"], rows)
+
+
+def scene_table() -> None:
+    """Energy drift over the whole scene, and distance from the truth up to half its horizon."""
+    study = tomllib.loads((ROOT / "studies/chaos.toml").read_text(encoding="utf-8"))
+    rows = []
+    for name in study["scenes"]:
+        scene = pb.load_scene(name)
+        truth = pb.reference(scene)
+        run = pb.simulate(scene, engine="analytic", times=truth.t)
+        whole = pb.simulate(scene, engine="analytic")
+        found = energy(scene, whole.theta, whole.omega)
+        drift = float(np.abs(found - found[0]).max() / energy_scale(scene))
+        apart = distance(scene.lengths, truth.theta, truth.offset(run.theta))
+        error = float(apart[truth.t <= truth.horizon / 2].max())
+        rows.append(
+            [
+                name,
+                str(whole.steps),
+                f"{drift:.1e}",
+                f"{LARGEST_DRIFT:.0e}",
+                verdict(drift, most=LARGEST_DRIFT),
+                f"{truth.horizon:.2f}",
+                f"{truth.error:.0e}",
+                f"{error:.1e}",
+                f"{LARGEST_DISTANCE:.0e}",
+                verdict(error, most=LARGEST_DISTANCE),
+            ]
+        )
+    print("### Method `adaptive` with its defaults, on the scenes of the study `chaos`\n")
+    table(
+        [
+            "scene",
+            "steps",
+            "energy drift",
+            "at most",
+            "verdict",
+            "horizon, s",
+            "truth's error",
+            "e up to half of it",
+            "at most",
+            "verdict",
+        ],
+        rows,
+    )
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=100, help="states of each kind and size (default: %(default)s)")
+    seeds = parser.parse_args(argv).seeds
+    versions = f"pendbench {pb.__version__}, numba {numba.__version__}, MuJoCo {mujoco.__version__}"
+    print(f"{versions}, Python {platform.python_version()}, {platform.machine()}, {os.cpu_count()} processors", end="")
+    print(f", load {os.getloadavg()[0]:.1f}\n" if hasattr(os, "getloadavg") else "\n")
+    speed_table()
+    error_table(seeds)
+    scene_table()
+
+
+if __name__ == "__main__":
+    main()
