@@ -110,16 +110,15 @@ def theirs(scene: Scene) -> Callable[[int], None]:
     return forward
 
 
-def empty() -> Callable[[int], None]:
-    """The same for a model of nothing: what a call from Python costs before any work is done."""
-    model = mujoco.MjSpec().compile()
-    data = mujoco.MjData(model)
+def nothing(scene: Scene) -> Callable[[int], None]:
+    """That many calls of what MuJoCo does for tendons, of which there are none: what a call from Python costs."""
+    model, data = mujoco_data(scene)
 
-    def forward(times: int) -> None:
+    def tendons(times: int) -> None:
         for _ in range(times):
-            mujoco.mj_forward(model, data)
+            mujoco.mj_tendon(model, data)
 
-    return forward
+    return tendons
 
 
 def seconds(calls: Callable[[int], None], times: int) -> float:
@@ -160,7 +159,7 @@ def speed_table() -> None:
             [own] = costs(ours(scene))
             beside = ["", "", "", ""]
         else:
-            own, other, call = costs(ours(scene), theirs(scene), empty())
+            own, other, call = costs(ours(scene), theirs(scene), nothing(scene))
             work = max(other.call - call.call, 0.0)
             ratio = work / own.call
             beside = [f"{work * 1e6:.2f}", other.noise, f"{ratio:.1f}", verdict(ratio, least=LEAST_SPEEDUP)]
@@ -181,7 +180,7 @@ def speed_table() -> None:
     print(f"### Cost of the accelerations (time of one thread, medians of {REPEATS} samples, in turn)\n")
     heads = ["n", "us", "ns per link", "at most", "spread", "verdict"]
     table([*heads, "MuJoCo, us", "spread", "ratio", "at least", "verdict"], rows)
-    print("MuJoCo: mj_forward, less the cost of the same call for a model of nothing.\n")
+    print("MuJoCo: mj_forward, all that the chain does not call for disabled, less what a call from Python costs.\n")
 
 
 def mujoco_accelerations(scene: Scene) -> FloatArray:

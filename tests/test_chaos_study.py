@@ -1,4 +1,4 @@
-"""The chaos study from its file to its table: what it finds, that it finds it again, and that it finishes what stopped."""
+"""The chaos study from its file to its table: what it finds, that it finds it again, that it goes on where it was."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from pendbench.study.plan import load_plan
 from tiny_study import Idle, Inline, Log, run, write_study
 
 #: What users and their scripts may rely on.
-FIXED = "scene n engine method dt status reason horizon_s error_max energy_drift_max step_us run_s".split()
+FIXED = ["scene", "n", "engine", "method", "dt", "status", "reason"]
+FIXED += ["horizon_s", "error_max", "energy_drift_max", "step_us", "run_s"]
 STAGES = ["compiled kernels", "the truth", "the engines", "the causes", "the clock, one at a time"]
 
 
@@ -49,9 +50,7 @@ def reproducible(table: pd.DataFrame) -> pd.DataFrame:
 
 def assert_same(one, other) -> None:
     """The same results, to the last bit of every number that does not come from a clock."""
-    pd.testing.assert_frame_equal(
-        reproducible(one.results.cases), reproducible(other.results.cases), check_exact=True
-    )
+    pd.testing.assert_frame_equal(reproducible(one.results.cases), reproducible(other.results.cases), check_exact=True)
     assert one.results.tables.keys() == other.results.tables.keys()
     for name, table in one.results.tables.items():
         pd.testing.assert_frame_equal(reproducible(table), reproducible(other.results.tables[name]), check_exact=True)
@@ -127,7 +126,7 @@ def test_a_fresh_run_runs_everything_again_and_spares_what_is_not_its_own(study,
         (work / file.name).write_bytes(file.read_bytes())
     (work / "notes.json").write_text("mine")
     run(study, tmp_path, Idle)
-    with pytest.raises(AssertionError, match="asked to run .*compile_kernel"):
+    with pytest.raises(AssertionError, match=r"asked to run .*compile_kernel"):
         run(study, tmp_path, Idle, fresh=True)
     assert [path.name for path in work.iterdir()] == ["notes.json"]
 

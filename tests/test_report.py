@@ -21,11 +21,12 @@ import report_data
 from pendbench.files import write_whole
 from pendbench.report import answer, summary_table, write_report
 from pendbench.report.chaos_causes import engine_sentences, growth_sentences, twins
+from pendbench.report.chaos_prices import prices
 from pendbench.report.rows import records
 from pendbench.report.tables import csv_text
 from pendbench.report.text import file_name, label, markdown, spreadsheet, table
 from pendbench.strict import printable
-from report_data import HOSTILE, NAN, results
+from report_data import ENGINE, HOSTILE, NAN, results
 
 ANY_TEXT = st.text(st.characters(codec=None), max_size=60)  # lone surrogates too
 NASTY = ["=1+1", "+1", "-1", "@x", "\t=1", " =1", "\uff1d1", "-", "a|b", "`|`", "<b>|</b>", "\\|", "a\nb", "\r\n"]
@@ -240,11 +241,13 @@ def test_times_show_the_median_and_the_extremes(page):
 
 
 def test_a_time_that_only_some_starts_have_says_so(tmp_path):
-    found = results(scenes=("wild",), engines=("ours",))
-    cases = found.cases.assign(**{"t_1e-2_not_reached": 1, "t_1e-2_max_s": NAN})
+    found = results(scenes=("wild",), engines=("ours",), without=("curves",))
+    some = {f"t_{name}_not_reached": 1 for name in ("1e-3", "1e-2")}
+    cases = found.cases.assign(**some, **{"t_1e-3_max_s": NAN, "t_1e-2_max_s": NAN})
     cases.loc[1, "t_1e-2_s"], cases.loc[1, "t_1e-2_min_s"] = NAN, 7.0
     write_report(replace(found, cases=cases), tmp_path)
     rows = cells_of(section((tmp_path / "report.md").read_text("utf-8"), "Scene wild"))
+    assert rows[2][3] == "3.45 [3.11 .. not before the horizon]"
     assert rows[2][4] == "not before the horizon [7 ..]"
     row = next(row for row in rows if row[2] == "0.001")
     assert row[4] == "not before the horizon"
@@ -255,6 +258,20 @@ def test_noise_is_named(page):
     assert "- calm: other rk4, step 0.001 s: spread 50%" in timings
     assert timings.count("spread 50%") == 3
     assert "24 cases of 27 were timed" in timings
+
+
+def test_engines_are_compared_at_equal_accuracy(page):
+    rows = {tuple(row[:2]): row[2:] for row in cells_of(section(page, "What time on the true path costs"))}
+    # Half of the horizon is 4 s: rk4 with 0.01 s stays for 4.6 s and costs a tenth of what the finer step does.
+    assert rows["wild", "ours"] == ["4", "ours rk4, step 0.01 s", "1", "steady"]
+    assert rows["wild", ENGINE][1] == "none of its cases"  # torn after 1.15 s, and crashed
+    assert rows["calm", "other"][1] == "other rk4, step 0.01 s"
+
+
+def test_a_noisy_price_says_so():
+    found = results(scenes=("wild",), engines=("other",))
+    cases = records(found.cases.assign(flags="noisy timing: spread 50%", step_spread=0.5))
+    assert cells_of(prices(cases))[1][-1] == "noisy (50%)"
 
 
 def test_definitions_cover_every_column_of_every_table(page):
@@ -277,7 +294,7 @@ PARTIAL = {
     "no starts": {"scenes": ("wild",), "without": ("starts",)},
     "nothing but cases": {"without": ("scenes", "causes", "starts", "curves")},
     "no cases": {"engines": ()},
-    "only a refusal": {"scenes": ("calm",), "engines": (report_data.ENGINE,)},
+    "only a refusal": {"scenes": ("calm",), "engines": (ENGINE,)},
 }
 
 
@@ -301,7 +318,7 @@ def test_empty_tables_are_reported(tmp_path):
 
 
 def test_a_scene_without_a_truth_says_so(tmp_path):
-    found = results(scenes=("wild",), failing=True)
+    found = results(scenes=("wild",), failing=True, without=("curves",))
     lost = found.tables["scenes"].assign(
         horizon_s=NAN, horizon_min_s=NAN, horizon_max_s=NAN, reference_error=NAN, status="timed out", reason="too slow"
     )
@@ -331,7 +348,7 @@ def test_the_answer_names_the_best_the_best_of_the_others_and_what_they_cost():
     assert "before the horizon (8 s)" in first
     assert "10 ms of computing per simulated second" in first
     assert second.startswith("The best of the other engines is")
-    assert report_data.ENGINE.split("|", maxsplit=1)[0] in second
+    assert ENGINE.split("|", maxsplit=1)[0] in second
 
 
 def test_the_answer_is_made_from_the_numbers():
@@ -369,7 +386,7 @@ def test_engines_that_stay_as_long_share_the_first_place():
         ({"failing": True}, "None of the 27 cases of this study stayed"),
         ({"engines": ("ours",)}, "No other engine took part."),
         ({"scenes": ("calm",)}, "In the regular scene calm"),
-        ({"scenes": ("wild",), "engines": ("ours", report_data.ENGINE)}, "ours"),
+        ({"scenes": ("wild",), "engines": ("ours", ENGINE)}, "ours"),
     ],
 )
 def test_answers_to_partial_results(changes, says):
@@ -385,7 +402,7 @@ def test_causes_say_which_system_is_simulated():
     ours = next(text for text in told if text.startswith("ours"))
     assert "simulates the same system: its accelerations agree with the equations to 1.0e-12" in ours
     assert "rk4 3.99 (4 claimed)" in ours
-    other = next(text for text in told if text.startswith(report_data.ENGINE))
+    other = next(text for text in told if text.startswith(ENGINE))
     assert "simulates another system" in other
     assert "differ by 2.0e-3" in other
 

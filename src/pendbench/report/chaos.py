@@ -11,6 +11,7 @@ from pendbench.report.chaos_answer import answer
 from pendbench.report.chaos_causes import engine_sentences, growth_sentences, twins
 from pendbench.report.chaos_method import method
 from pendbench.report.chaos_plots import COST, pictures
+from pendbench.report.chaos_prices import prices
 from pendbench.report.chaos_scenes import each_scene, overview
 from pendbench.report.columns import NOTHING, is_missing, number_text, shown
 from pendbench.report.plots import Picture
@@ -52,7 +53,7 @@ def markdown_page(results: Results, plots: Sequence[Picture]) -> str:
         "## Why they leave the truth",
         *_causes(records(results.tables.get("causes")), cases, scenes),
         "## What time on the true path costs",
-        *_cost(plots),
+        *_cost(plots, cases),
         "## What failed",
         sections.failures(cases, scenes),
         "## How it was measured",
@@ -135,11 +136,17 @@ def _neighbour(row: Row) -> Any:
     return "regular motion" if is_missing(row.get("lyapunov_per_s")) else row.get("neighbours_growth_per_s")
 
 
-def _cost(plots: Sequence[Picture]) -> Iterator[str]:
+def _cost(plots: Sequence[Picture], cases: Sequence[Row]) -> Iterator[str]:
     found = [plot for plot in plots if plot.name == COST]
     yield from (sections.picture(plot) for plot in found)
     if not found:
         yield "Nothing was timed, so there is no plot of costs."
+        return
+    yield (
+        "Engines compare at equal accuracy, not at equal step. The cheapest case of each that ends well and does not "
+        "pass 1e-2 before half of the horizon:"
+    )
+    yield prices(cases)
 
 
 def _costs_of_failures(cases: Sequence[Row]) -> Iterator[str]:

@@ -23,6 +23,7 @@ class _Stay:
     share: of the horizon, 1 where it does not leave before, 0 where it failed. time: s, nan in both these cases.
     """
 
+    scene: str
     row: Row
     share: float
     time: float
@@ -97,18 +98,18 @@ def _candidates(cases: Sequence[Row], scenes: list[str], shares: dict[tuple[str,
             by_name.setdefault(case_name(row, with_scene=False), {})[word(row, "scene")] = row
     return [
         _Candidate(name, word(next(iter(rows.values())), "engine"),
-                   [_stay(rows.get(scene, {}), shares.get((scene, name))) for scene in scenes])
+                   [_stay(scene, rows.get(scene, {}), shares.get((scene, name))) for scene in scenes])
         for name, rows in by_name.items()
     ]  # fmt: skip
 
 
-def _stay(row: Row, share: float | None) -> _Stay:
+def _stay(scene: str, row: Row, share: float | None) -> _Stay:
     time, horizon = number(row, _TIME), number(row, "horizon_s")
     stays = math.isnan(time) and number(row, _NOT_REACHED) > 0
     if share is None and not math.isnan(time) and horizon > 0:
         share = min(1.0, time / horizon)
     known = stays or not math.isnan(time)
-    return _Stay(row, 1.0 if stays else share or 0.0 if known else 0.0, time, stays)
+    return _Stay(scene, row, 1.0 if stays else share or 0.0 if known else 0.0, time, stays)
 
 
 def _others(ranked: list[_Candidate], best: _Candidate) -> str:
@@ -133,19 +134,24 @@ def _says(candidate: _Candidate) -> str:
     """How long one candidate stays and what that costs, as a clause."""
     left = [stay for stay in candidate.stays if not math.isnan(stay.time)]
     stayed = [stay for stay in candidate.stays if stay.stays]
-    failed = len(candidate.stays) - len(left) - len(stayed)
+    failed = [stay for stay in candidate.stays if math.isnan(stay.time) and not stay.stays]
     clauses = []
     if left:
         times = spanned([stay.time for stay in left], _TIME)
-        where = f" in {counted(len(left), 'scene')}" if stayed or failed else ""
+        where = _places(left) if stayed or failed else ""
         clauses.append(f"leaves it after {times} s ({_percents([stay.share for stay in left])} of the horizon){where}")
     if stayed:
         horizon = spanned(finite([stay.row for stay in stayed], "horizon_s") or [math.nan], "horizon_s")
-        where = f" in {counted(len(stayed), 'scene')}" if left or failed else ""
+        where = _places(stayed) if left or failed else ""
         clauses.append(f"{'not' if left else 'does not leave it'} before the horizon ({horizon} s){where}")
     if failed:
-        clauses.append(f"fails in {counted(failed, 'scene')}")
+        clauses.append(f"fails{_places(failed)}")
     return f"{listed(clauses)}, {_price(candidate)}"
+
+
+def _places(stays: Sequence[_Stay]) -> str:
+    """`` in double and triple``, or how many scenes where they are more."""
+    return f" in {listed([stay.scene for stay in stays])}" if len(stays) <= 2 else f" in {len(stays)} scenes"
 
 
 def _price(candidate: _Candidate) -> str:

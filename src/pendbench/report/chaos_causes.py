@@ -8,7 +8,7 @@ from itertools import combinations
 from typing import Final
 
 from pendbench.report.columns import number_text, shown
-from pendbench.report.rows import Row, distinct, finite, method_name, number, of, spanned, word
+from pendbench.report.rows import Row, distinct, finite, method_name, number, of, spanned, stays_until, word
 from pendbench.report.text import listed
 
 #: Errors that agree to this share of themselves, at every step and in every scene, come from the same method.
@@ -97,9 +97,7 @@ def _span(ratios: Sequence[float]) -> str:
 
 def _stayed(row: Row, exponent: float) -> float:
     """For how many Lyapunov times a case stays with the truth."""
-    time = number(row, "t_1e-2_s")
-    if math.isnan(time) and number(row, "t_1e-2_not_reached") > 0:
-        time = number(row, "horizon_s")
+    time = stays_until(row)
     return time * exponent if math.isfinite(time) else 0.0
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendbench.report.look import ENDED, Look, name_missing
 from pendbench.report.plots import GREY, bounds, logarithmic, panels
-from pendbench.report.rows import Row, distinct, finite, is_ok, method_name, number, of, word
+from pendbench.report.rows import Row, distinct, finite, is_ok, method_name, number, of, stays_until, word
 from pendbench.report.text import label
 
 if TYPE_CHECKING:
@@ -49,15 +49,10 @@ def _stayed(row: Row) -> bool:
     return math.isnan(number(row, "t_1e-2_s")) and number(row, "t_1e-2_not_reached") > 0
 
 
-def _place(row: Row) -> float:
-    """Where a case is on the axis of time: its time to divergence, or the horizon where it does not get there."""
-    return number(row, "horizon_s" if _stayed(row) else "t_1e-2_s")
-
-
 def _draw_panel(axes: Axes, look: Look, rows: Sequence[Row]) -> None:
     for horizon in finite(rows, "horizon_s")[:1]:
         axes.axvline(horizon, color="black", linewidth=1.0, zorder=0)
-    drawn = [row for row in rows if math.isfinite(_place(row)) and is_priced(row)]
+    drawn = [row for row in rows if math.isfinite(stays_until(row)) and is_priced(row)]
     for engine in look.engines:
         for method in look.methods[engine]:
             own = [row for row in of(drawn, engine=engine) if method_name(row) == method]
@@ -71,14 +66,14 @@ def _draw_method(axes: Axes, look: Look, rows: Sequence[Row]) -> None:
         return
     engine, method = word(rows[0], "engine"), method_name(rows[0])
     colour = look.colour(engine, method)
-    axes.plot([_place(row) for row in rows], [_cost(row) for row in rows], color=colour, linewidth=0.8)
+    axes.plot([stays_until(row) for row in rows], [_cost(row) for row in rows], color=colour, linewidth=0.8)
     for row in rows:
         marker: dict[str, Any] = {"marker": look.marker(engine, method), "markersize": 6, "linestyle": "none"}
         if _stayed(row):
             marker = _STAYED
         if not is_ok(row):
             marker = {**ENDED, "zorder": 5}
-        axes.plot([_place(row)], [_cost(row)], color=colour, clip_on=False, **marker)
+        axes.plot([stays_until(row)], [_cost(row)], color=colour, clip_on=False, **marker)
 
 
 def _explain(figure: Figure, look: Look) -> None:

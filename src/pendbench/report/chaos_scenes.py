@@ -33,9 +33,9 @@ How to read what follows:
   a band. Rising: it drifts. What runs along the top is beyond it: it has blown up.
 - **Crosses.** The run ended there, not well.
 - **Tables.** Times until e(t) passes 1e-3, 1e-2 and 1e-1: the median over the starts [earliest .. latest]; then the
-  three medians in Lyapunov times. Errors, energies and the joint gap are those of the scene's own start; the status is
-  that of the start that ended worst. *Not before the horizon*: the median start is still nearer to the truth than that
-  when there is nothing left to compare it with."""
+  three medians in Lyapunov times. A time no longer than the sampling interval is an upper bound. Errors, energies and
+  the joint gap are those of the scene's own start; the status is that of the start that ended worst. *Not before the
+  horizon*: the median start is still nearer to the truth than that when there is nothing left to compare it with."""
 
 _HEADINGS: Final = (
     "engine", "method", "step, s", "to 1e-3, s", "to 1e-2, s", "to 1e-1, s", "Lyapunov times", "e to half horizon",
@@ -71,14 +71,14 @@ def _overview_row(row: Row) -> list[str]:
     ]
 
 
-def _horizon(scene: Row) -> str:
-    """The horizon in s, what ends it, and how it differs between the starts."""
+def _horizon(scene: Row, unit: str = "") -> str:
+    """The horizon, what ends it, and how it differs between the starts. unit: of its first number."""
     if math.isnan(number(scene, "horizon_s")):
         return f"none ({sections.status_text(scene)})"
     end = ", the scene's end" if number(scene, "horizon_s") >= number(scene, "duration_s") else ""
     low, high = sections.cell(scene, "horizon_min_s"), sections.cell(scene, "horizon_max_s")
     starts = "" if low == high else f" ({low} to {high} over the starts)"
-    return f"{sections.cell(scene, 'horizon_s')}{end}{starts}"
+    return f"{sections.cell(scene, 'horizon_s')}{unit}{end}{starts}"
 
 
 def each_scene(cases: Sequence[Row], scenes: Sequence[Row], plots: Sequence[Picture]) -> Iterator[str]:
@@ -97,7 +97,7 @@ def _facts(scene: Row) -> str:
         return f"There is no truth to compare with: {sections.status_text(scene, 300)}."
     links = "" if is_missing(scene.get("n")) else f"{counted(int(number(scene, 'n')), 'link')}. "
     text = (
-        f"{links}Horizon, s: {_horizon(scene)}; up to there the reference's two solves differ by "
+        f"{links}Horizon: {_horizon(scene, ' s')}; up to there the reference's two solves differ by "
         f"{sections.cell(scene, 'reference_error')} at most."
     )
     exponent, error = number(scene, "lyapunov_per_s"), sections.cell(scene, "lyapunov_error_per_s")

@@ -161,7 +161,7 @@ _CAUSES: Final = {
         "what the last refinement changed in the model error: how well it is known, give or take a factor of some tens",
     ),
     "order_claimed": Column("1", "d", "order claimed", "the method's order by its makers", empty="adaptive"),
-    "order_observed": Column("1", ".3g", "order observed", "the order with which the error falls between two steps"),
+    "order_observed": Column("1", ".2f", "order observed", "the order with which the error falls between two steps"),
     "order_dt_coarse": Column("s", ".3g", "from step, s", "the coarser of the two steps that show the order"),
     "order_dt_fine": Column("s", ".3g", "to step, s", "the finer of the two steps that show the order"),
     "plateau": Column("L", ".1e", "plateau", "the error below which smaller steps do not bring it", empty="none"),

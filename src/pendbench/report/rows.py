@@ -57,6 +57,12 @@ def is_noisy(row: Row) -> bool:
     return "noisy timing" in word(row, "flags")
 
 
+def stays_until(row: Row) -> float:
+    """The time, s, at which the median start's error passes 1e-2, or the horizon where it does not; nan if unknown."""
+    time = number(row, "t_1e-2_s")
+    return number(row, "horizon_s") if math.isnan(time) and number(row, "t_1e-2_not_reached") > 0 else time
+
+
 def in_order(rows: Iterable[Row]) -> list[Row]:
     """Rows by engine, method, settings and step, the coarsest step first."""
 
