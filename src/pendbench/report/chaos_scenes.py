@@ -18,9 +18,10 @@ _NOT_BEFORE: Final = "not before the horizon"
 
 _TRUTH: Final = """\
 The truth is computed twice, in arithmetic of 32 digits and from two formulations. The horizon is the time until which
-the two agree to 1e-9 of the chain's length; nothing is compared past it. A Lyapunov time is one over the exponent: the
-time in which a small error grows e-fold in the long run. A neighbour's growth is the rate at which a start 1e-10 rad
-away leaves the truth in these very seconds."""
+the two agree to 1e-9 of the chain's length; nothing is compared past it. Each start has its own, and where one number
+is given it is that of the scene's own start: a median over the starts can lie a little past it. A Lyapunov time is one
+over the exponent: the time in which a small error grows e-fold in the long run. A neighbour's growth is the rate at
+which a start 1e-10 rad away leaves the truth in these very seconds."""
 
 _READING: Final = """\
 How to read what follows:
