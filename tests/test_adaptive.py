@@ -10,6 +10,7 @@ import pytest
 
 from pendbench.physics.exact import single_pendulum
 from pendbench.physics.recursion import system_of
+from pendbench.scene import load_scene
 from pendbench.solvers.adaptive import DONE, FIRST_STEP, NOT_FINITE, REASONS, TOO_MANY, TOO_SMALL, integrate
 from pendbench.solvers.tableaux import DOP853
 from pendbench.trajectory import STATUSES
@@ -90,6 +91,13 @@ def test_error_follows_the_tolerance(tolerance):
 def test_steps_grow_as_the_tolerance_to_the_power_of_an_eighth():
     counts = [Run(OSCILLATOR, START, tolerance).to(200.0).accepted for tolerance in (1e-12, 1e-8)]
     assert math.log(counts[0] / counts[1]) / math.log(1e4) == pytest.approx(1 / 8, abs=0.01)
+
+
+def test_few_steps_are_in_vain():
+    """One in eight, where the motion quickens; a wrong exponent in the step control makes it one in two."""
+    scene = load_scene("double")
+    done = Run(system_of(scene), np.append(scene.angles, scene.rates), 1e-14, relative=1.0).to(10.0)
+    assert done.rejected < 0.2 * done.accepted
 
 
 def test_lands_on_times_that_fit_no_step():

@@ -29,7 +29,7 @@ _KERNEL_SOURCES = ("compiled.py", "physics/*.py", "solvers/*.py")
 
 #: Division by zero gives inf or nan, as in numpy: a test before each division would cost time and catch nothing.
 #: A product and a sum may be rounded once instead of twice.
-_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}}
+_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
 
 _INLINED: Any = {**_OPTIONS, "forceinline": True}
 

@@ -17,7 +17,9 @@ from pendbench.solvers import adaptive, explicit, gauss, rattle, tableaux
 
 
 def _finite(*arrays: FloatArray) -> Fault | None:
-    return None if all(np.all(np.isfinite(array)) for array in arrays) else Fault("not finite", "an angle or a rate is not finite")
+    if all(np.all(np.isfinite(array)) for array in arrays):
+        return None
+    return Fault("not finite", "an angle or a rate is not finite")
 
 
 class RungeKutta:

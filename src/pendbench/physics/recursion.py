@@ -12,6 +12,7 @@ from pendbench.physics.system import System
 from pendbench.physics.trigonometry import direction, write_bends
 from pendbench.scene import Scene
 from pendbench.solvers import problem
+from pendbench.solvers.copying import copy
 
 # The rows of a system's scratch. Outwards, each link's tension takes the place of the cosine it no longer needs.
 _OWN, _PASSED, _ACROSS, _COSINE = range(4)
@@ -81,7 +82,7 @@ def _write_acceleration(system: System, t: float, q: FloatArray, v: FloatArray, 
 @inlined
 def _write_derivative(system: System, t: float, y: FloatArray, dy: FloatArray) -> None:  # noqa: ARG001
     n = len(system.masses)
-    dy[:n] = y[n:]
+    copy(y[n:], dy)
     write_accelerations(system, y[:n], y[n:], dy[n:])
 
 

@@ -75,10 +75,20 @@ def _threshold(name: str) -> dict[str, Column]:
 _WHAT: Final = {
     "scene": _text("scene", "the scene's name"),
     "n": Column("1", "d", "n", "links of the chain"),
+    "accuracy": Column("L", ".0e", "error up to", "the error that is allowed: the largest e(t) up to compare_s"),
     "start": Column("1", "d", "start", "0: the scene's own start; the others are perturbed"),
     "engine": _text("engine", "the program that simulated"),
     "method": _text("method", "one way in which the engine advances time"),
-    "dt": Column("s", ".3g", "step, s", "the step; empty for a method that chooses its own", empty="its own"),
+    "dt": Column(
+        "s",
+        ".3g",
+        "step, s",
+        "the step; empty for a method that chooses its own (in prices.csv: interpolated, empty where not reached)",
+        empty="its own",
+    ),
+    "tolerance": Column(
+        "1", ".1e", "tolerance", "the tolerance of a method that chooses its steps, interpolated; empty where not reached"
+    ),
     "settings": _text("settings", "settings of the method that differ from its defaults"),
     "status": _text("status", "how the case ended: as the worst of its starts did"),
     "reason": _text("reason", "why, where it did not end well"),
@@ -87,6 +97,8 @@ _WHAT: Final = {
 _TRUTH: Final = {
     "duration_s": Column("s", ".3g", "duration, s", "how long the scene lasts"),
     "starts": Column("1", "d", "starts", "starts that were run: the scene's own and the perturbed ones"),
+    "compare_s": Column("s", ".4g", "compared up to, s", "until when errors are compared and costs are counted"),
+    "samples": Column("1", "d", "samples", "evenly spaced times at which errors are compared"),
     "horizon_s": Column("s", ".3g", "horizon, s", "until when the reference is known; nothing is compared past it"),
     "horizon_min_s": Column("s", ".3g", "earliest horizon, s", "the earliest horizon of the starts"),
     "horizon_max_s": Column("s", ".3g", "latest horizon, s", "the latest horizon of the starts"),
@@ -111,14 +123,15 @@ _ERRORS: Final = {
         "L", ".1e", "e", "the largest distance of any mass from where it should be; empty past the horizon"
     ),
     "energy_error": Column("energy scale", ".1e", "energy error", "deviation of the energy from its first value"),
-    "error_max": Column("L", ".1e", "e max", "the largest e(t) up to the horizon, or to where the run ended"),
+    "error_max": Column("L", ".1e", "e max", "the largest e(t) up to the horizon (or compare_s), or to where the run ended"),
     "error_half": Column("L", ".1e", "e to half horizon", "the largest e(t) up to half of the horizon"),
     "angle_error_max_rad": Column(
-        "rad", ".1e", "angle error", "the largest error of any angle, wrapped, up to the horizon"
+        "rad", ".1e", "angle error", "the largest error of any angle, wrapped, up to the horizon (or compare_s)"
     ),
     "reference_error_half": Column(
         "L", ".1e", "reference error to half", "the reference's own e up to half of the horizon"
     ),
+    "best_error": Column("L", ".1e", "best e", "the smallest error max of all steps or tolerances of a method"),
 }
 
 _ENERGY: Final = {
@@ -135,6 +148,15 @@ _ENERGY: Final = {
         ".1e",
         "drift per s",
         "the slope of a least-squares line through the energy: near zero for a method that keeps it in a band",
+    ),
+    "energy_slope_share": Column(
+        "1", ".2g", "slope's share", "what the slope alone moves the energy by over the whole run, over the band"
+    ),
+    "energy_band_first_tenth": Column(
+        "energy scale", ".1e", "band, first tenth", "the energy's band over the first tenth of the run"
+    ),
+    "energy_band_last_tenth": Column(
+        "energy scale", ".1e", "band, last tenth", "the energy's band over the last tenth of the run"
     ),
     "energy_drift_half": Column(
         "energy scale", ".1e", "drift to half", "the largest deviation of the energy up to half of the horizon"
@@ -182,7 +204,16 @@ _CAUSES: Final = {
 }
 
 _COSTS: Final = {
+    "steps": Column("1", "d", "steps", "steps that the run took"),
     "step_us": Column("us", ".3g", "step, µs", "the median cost of a step", is_time=True),
+    "step_and_state_us": Column(
+        "us",
+        ".3g",
+        "step and state, µs",
+        "a step and a look at the state from Python; for a method that chooses its steps: advancing by compare_s / "
+        "samples and a look",
+        is_time=True,
+    ),
     "step_spread": Column(
         "1", ".0%", "spread", "largest less smallest sample of the step's cost, over the median", is_time=True
     ),
@@ -191,7 +222,11 @@ _COSTS: Final = {
     "first_call_s": Column(
         "s", ".2g", "first call, s", "the first step of all, with what is compiled or loaded then", is_time=True
     ),
-    "run_s": Column("s", ".3g", "run, s", "time spent stepping up to the horizon", is_time=True),
+    "run_s": Column("s", ".3g", "run, s", "time spent stepping up to the horizon (or compare_s)", is_time=True),
+    "digit_price": Column(
+        "1", ".3g", "one more digit", "by what factor the cost grows where the error is to fall tenfold", is_time=True
+    ),
+    "bound": _text("bound", "whether the coarsest step that ran is as accurate already: the time is an upper bound"),
     "flags": _text("flags", "what a reader should know about the row, its timing included", is_time=True),
 }
 
@@ -257,6 +292,14 @@ def number_text(value: Any, spec: str = ".3g") -> str:
     if spec.endswith("g"):
         text = f"{float(text):.6g}"
     return re.sub(r"e([+-])0*(\d)", lambda m: f"e{m[1].strip('+')}{m[2]}", text)
+
+
+def duration_text(seconds: float) -> str:
+    """A time for people, to the two digits that a timing is worth, in the unit of its size: ``38 µs``, ``2.3 ms``."""
+    for unit, size in (("µs", 1e-6), ("ms", 1e-3)):
+        if seconds < 1e3 * size:
+            return f"{number_text(seconds / size, '.2g')} {unit}"
+    return f"{number_text(seconds, '.2g')} s" if math.isfinite(seconds) else NOTHING
 
 
 def stored(name: str, value: Any) -> str | int | float:

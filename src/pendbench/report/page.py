@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pendbench.study.results import Results
 
 #: Kinds of study, each with the module of its page. The others have the plain one.
-PAGES: Final = {"chaos": "pendbench.report.chaos"}
+PAGES: Final = {"chaos": "pendbench.report.chaos", "cost": "pendbench.report.cost"}
 
 _PLAIN: Final = "pendbench.report.plain"
 

@@ -6,7 +6,7 @@ import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 from pendbench.report.columns import number_text
 
@@ -79,18 +79,18 @@ def panels(count: int, columns: int, width: float, height: float) -> tuple[Figur
     return figure, axes[:count]
 
 
-def logarithmic(axes: Axes, low: float, high: float) -> None:
-    """A logarithmic vertical axis from low to high, labelled at whole decades."""
+def logarithmic(axes: Axes, low: float, high: float, which: Literal["x", "y"] = "y") -> None:
+    """A logarithmic axis from low to high, the vertical one by default, labelled at whole decades."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
-    axes.set_yscale("log")
-    axes.set_ylim(low, high)
+    axes.set(**{f"{which}scale": "log", f"{which}lim": (low, high)})
+    its = axes.yaxis if which == "y" else axes.xaxis
     decades = max(1, math.ceil(math.log10(high / low) / 8))
-    axes.yaxis.set_major_locator(LogLocator(base=10.0**decades, numticks=20))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number_text(value, ".0e")))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.grid(axis="y", color="0.9", linewidth=0.6)
+    its.set_major_locator(LogLocator(base=10.0**decades, numticks=20))
+    its.set_major_formatter(FuncFormatter(lambda value, _: number_text(value, ".0e")))
+    its.set_minor_locator(NullLocator())
+    its.set_minor_formatter(NullFormatter())
+    axes.grid(axis=which, color="0.9", linewidth=0.6)
 
 
 def bounds(values: Sequence[float], lowest: float, highest: float) -> tuple[float, float]:

@@ -161,7 +161,8 @@ def definitions(names: Iterable[str]) -> str:
 def files(results: Results) -> str:
     """What else was written, and which columns depend on the clock."""
     tables = [f"`{name}.csv`" for name in ("cases", *results.tables)]
-    clocked = [f"`{name}`" for name, declared in COLUMNS.items() if declared.is_time and name in results.cases]
+    written = {str(name) for frame in (results.cases, *results.tables.values()) for name in frame}
+    clocked = [f"`{name}`" for name, declared in COLUMNS.items() if declared.is_time and name in written]
     text = f"Every number above, to its last digit: {listed(tables)}. What they come from: `provenance.json`."
     if clocked:
         text += f" Columns that depend on the clock, and so are not reproduced: {listed(clocked)}."

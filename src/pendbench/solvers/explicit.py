@@ -8,6 +8,7 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, inlined
+from pendbench.solvers.copying import copy
 from pendbench.solvers.problem import acceleration, derivative
 from pendbench.solvers.tableaux import Tableau
 
@@ -15,7 +16,7 @@ from pendbench.solvers.tableaux import Tableau
 @inlined
 def stage_state(a: FloatArray, row: int, h: float, y: FloatArray, k: FloatArray, out: FloatArray) -> None:
     """Write `y + h sum_j a[row, j] k[j]` over the stages before `row` into `out`."""
-    out[:] = y
+    copy(y, out)
     for j in range(row):
         weight = h * a[row, j]
         if weight != 0.0:

@@ -15,6 +15,7 @@ import numpy as np
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
 from pendbench.solvers.adaptive import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL, Progress
+from pendbench.solvers.copying import copy_rows
 from pendbench.solvers.double_double import Number, add, divide, multiply, split, subtract
 
 
@@ -48,7 +49,7 @@ def _midpoint(system: Any, y: FloatArray, dy: FloatArray, h: Number, steps: int,
     slope = room[2]
     substep = divide(h, (float(steps), 0.0))
     twice = (2.0 * substep[0], 2.0 * substep[1])
-    before[:] = y
+    copy_rows(y, before)
     _axpy(now, y, substep, dy)
     for _ in range(steps - 1):
         extended_derivative(system, now, slope)
@@ -120,14 +121,14 @@ def integrate_extended(
         if not np.all(np.isfinite(dy)):
             return Progress(NOT_FINITE, t, h, accepted, rejected)
         for row in range(columns):
-            table[row] = _midpoint(system, y, dy, exact_step, 2 * (row + 1), room)
+            copy_rows(_midpoint(system, y, dy, exact_step, 2 * (row + 1), room), table[row])
             _extrapolate(table, row, weights)
         error = _error(table, y, tolerance, relative)
         factor = 0.2
         if np.isfinite(error):
             factor = min(3.0, max(0.2, 0.9 * max(error, 1e-30) ** (-1.0 / (2 * columns - 1))))
         if error <= 1.0:
-            y[:] = table[0]
+            copy_rows(table[0], y)
             t = target
             accepted += 1
             h = max(h, step * factor) if last else step * factor

@@ -14,6 +14,7 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, inlined
+from pendbench.solvers.copying import copy_rows
 from pendbench.solvers.problem import generalized_force, velocity
 
 _MOST_ITERATIONS = 60
@@ -72,7 +73,7 @@ def _add(weights: FloatArray, h: float, slopes: FloatArray, y: FloatArray, carry
 @inlined
 def _guess(extrapolate: FloatArray, slopes: FloatArray, room: FloatArray) -> None:
     """Replace the slopes of the step before by what their polynomial says of this one."""
-    room[:] = slopes
+    copy_rows(slopes, room)
     for s in range(len(extrapolate)):
         for i in range(slopes.shape[1]):
             total = 0.0

@@ -12,6 +12,7 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, inlined
+from pendbench.solvers.copying import copy_rows
 
 _MOST_ITERATIONS = 50
 
@@ -119,7 +120,7 @@ def rattle(
             moved[i, 1] = points[i, 1] + h * speeds[i, 1] - 0.5 * h * h * rods.gravity
         worst, before = np.inf, np.inf
         for iteration in range(_MOST_ITERATIONS):
-            trial[:] = moved
+            copy_rows(moved, trial)
             _push(masses, old_x, old_y, forces, trial)
             _rods_of(trial, new_x, new_y)
             before, worst = worst, 0.0

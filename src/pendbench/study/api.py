@@ -6,12 +6,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 import pandas as pd
 
 from pendbench.errors import InputError
 from pendbench.report import write_report
-from pendbench.strict import shown_path
+from pendbench.strict import show, shown_path
 from pendbench.study.baseline import baseline_path, read_baseline, regressions, write_baseline
 from pendbench.study.jobs import LocalPool
 from pendbench.study.kinds import kind
@@ -20,6 +21,8 @@ from pendbench.study.provenance import provenance
 from pendbench.study.results import Results
 from pendbench.study.runner import Runner, Silence, Watcher
 from pendbench.study.store import Store
+
+_MOST_WORKERS: Final = 1024
 
 
 @dataclass(frozen=True)
@@ -70,8 +73,8 @@ def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
     Raises `InputError`, one line, before anything is written where the request cannot be met.
     """
     workers = processors() if request.jobs is None else request.jobs
-    if workers < 1:
-        raise InputError(f"--jobs is {workers}; allowed: 1 or more")
+    if type(workers) is not int or not 1 <= workers <= _MOST_WORKERS:
+        raise InputError(f"--jobs is {show(workers)}; allowed: 1 to {_MOST_WORKERS}")
     plan = load_plan(request.study, quick=request.quick, engines=request.engines)
     where = baseline_path(find_study(request.study), quick=request.quick)
     baseline = read_baseline(where) if request.check else None
@@ -94,18 +97,22 @@ def run_study(
     out: str | os.PathLike[str] | None = None,
     *,
     quick: bool = False,
-    engines: Sequence[str] = (),
+    engines: str | Sequence[str] = (),
     jobs: int | None = None,
     fresh: bool = False,
 ) -> pd.DataFrame:
     """Run a study, write its report to `out` (default `results/NAME`), and return its table, one row per case.
 
-    study: a bundled study's name or a file. quick: the study's quick variant. engines: only these. jobs: worker
-    processes, one per processor by default. fresh: run again what an earlier run left in `out`. Scripts that call this
-    need the usual `if __name__ == "__main__":` guard, since it starts processes.
+    study: a bundled study's name or a file. quick: the study's quick variant. engines: only this one, or these. jobs:
+    worker processes, one per processor by default. fresh: run again what an earlier run left in `out`. Scripts that
+    call this need the usual `if __name__ == "__main__":` guard, since it starts processes.
 
     Raises InputError, one line, for whatever cannot be used.
     """
-    folder = None if out is None else Path(out)
-    request = Request(study, folder, quick=quick, engines=tuple(engines), jobs=jobs, fresh=fresh)
+    try:
+        folder = None if out is None else Path(out)
+    except TypeError:
+        raise InputError(f"--out {show(out)}: not a path; allowed: a folder that can be written") from None
+    chosen = (engines,) if isinstance(engines, str) else tuple(engines)
+    request = Request(study, folder, quick=quick, engines=chosen, jobs=jobs, fresh=fresh)
     return run_request(request).results.cases

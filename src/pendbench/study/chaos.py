@@ -106,7 +106,7 @@ class _Chaos:
 
     def measure(self) -> None:
         """Run what the study asks for."""
-        compile_kernels(self.runner, self.plan.scenes[0], self.options.time_limit)
+        compile_kernels(self.runner, self.plan.cases, self.options.time_limit)
         self._measure_truths()
         self._measure_runs()
         self._measure_models()

@@ -21,6 +21,7 @@ from pendbench.scene import Scene
 from pendbench.scene_file import Table
 from pendbench.strict import input_error
 from pendbench.study import flags
+from pendbench.study.ask import refusal, version
 from pendbench.study.case import Case, settings_text
 from pendbench.study.jobs import Job
 from pendbench.study.measure import observed_order, price_of, price_of_digit
@@ -78,6 +79,10 @@ def check(plan: Plan) -> None:
         if windows[scene.name].time > scene.duration:
             found, most = windows[scene.name].time, scene.duration
             raise input_error(f"{plan.where} [windows.{scene.name}]", f"time is {found:g}; allowed: up to {most:g} s")
+    for case in plan.cases:
+        most = windows[case.scene.name].time
+        if case.dt is not None and case.dt > most:
+            raise input_error(plan.where, f"{case}: allowed: dt up to {most:g} s, the time that is compared")
     for name in long_runs.scenes if long_runs else ():
         if name not in names:
             raise input_error(f"{plan.where} [long_runs]", f"scenes: {choose('scene', printable(name), names)}")
@@ -121,12 +126,12 @@ class _Cost:
         self.runs: dict[Case, Record] = {}
         self.timings: dict[Case, Record] = {}
         self.long: dict[Case, Record] = {}
-        self.refusals = {case: engine(case.engine).refuses(case.scene) for case in plan.cases}
+        self.refusals = {case: refusal(case) for case in plan.cases}
         self.accepted = [case for case in plan.cases if self.refusals[case] is None]
 
     def measure(self) -> None:
         """Run what the study asks for."""
-        compile_kernels(self.runner, self.plan.scenes[0], self.options.time_limit)
+        compile_kernels(self.runner, self.plan.cases, self.options.time_limit)
         self._measure_truths()
         self._measure_runs()
         self._measure_long_runs()
@@ -149,7 +154,7 @@ class _Cost:
         owners = {}
         for case in self.accepted:
             times, truth = times_of(case, self.options.windows[case.scene.name]), self.truths[case.scene.name]["key"]
-            content = (*case.content, engine(case.engine).version(), truth, times.tobytes())
+            content = (*case.content, version(case.engine), truth, times.tobytes())
             owners[case] = self._job(measure_error, content, case, times, truth, self.runner.store)
         found = self.runner.run("the errors", list(owners.values()), lambda _, fault: failed_run(fault))
         self.runs = {case: found[job.key] for case, job in owners.items()}
@@ -165,7 +170,7 @@ class _Cost:
     def _measure_long_runs(self) -> None:
         owners = {}
         for case in self._long_cases():
-            content = (*case.content, self.options.long_runs.steps, engine(case.engine).version())
+            content = (*case.content, self.options.long_runs.steps, version(case.engine))
             owners[case] = self._job(measure_long_run, content, case, self.options.long_runs.steps)
         found = self.runner.run("long runs", list(owners.values()), lambda _, fault: failed_run(fault))
         self.long = {case: found[job.key] for case, job in owners.items()}
@@ -176,7 +181,7 @@ class _Cost:
             if self.runs[case]["status"] != "ok":
                 continue  # how quickly a run fails is not what it costs
             window = self.options.windows[case.scene.name]
-            content = (*case.content, window.time, engine(case.engine).version())
+            content = (*case.content, window.time, version(case.engine))
             arguments = (case, window.time, window.time / window.samples)
             owners[case] = self._job(measure_cost_timing, content, *arguments)
         found = self.runner.run(
@@ -273,7 +278,7 @@ class _Cost:
 
     def _row(self, case: Case, order: Record) -> Record:
         run, timing = self.runs.get(case, {}), self.timings.get(case, {})
-        refusal, truth = self.refusals[case], self.truths[case.scene.name]
+        refused, truth = self.refusals[case], self.truths[case.scene.name]
         row: Record = {
             "scene": case.scene.name,
             "n": case.scene.n,
@@ -281,8 +286,8 @@ class _Cost:
             "method": case.method,
             "dt": math.nan if case.dt is None else case.dt,
             "settings": case.settings_text,
-            "status": "refused" if refusal else run["status"],
-            "reason": refusal or run["reason"],
+            "status": "refused" if refused else run["status"],
+            "reason": refused or run["reason"],
             "horizon_s": truth.get("horizon", math.nan),
             "compare_s": self.options.windows[case.scene.name].time,
             **{name: run.get(name) for name in _RUN_COLUMNS},

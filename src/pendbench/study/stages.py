@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault
 from pendbench.scene import Scene
+from pendbench.study.case import Case
 from pendbench.study.jobs import Job
 from pendbench.study.runner import Runner
 from pendbench.study.store import Store, key_of
@@ -19,9 +20,11 @@ def job_of(function: Callable[..., Any], depends_on: tuple[object, ...], time_li
     return Job(key_of(function.__name__, *depends_on), function, arguments, time_limit)
 
 
-def compile_kernels(runner: Runner, scene: Scene, time_limit: float) -> None:
-    """Compile what every study needs, side by side, before the first job waits for it."""
-    jobs = [job_of(compile_kernel, (name,), time_limit, name, scene) for name in KERNELS]
+def compile_kernels(runner: Runner, cases: Sequence[Case], time_limit: float) -> None:
+    """Compile what the cases and their truth need, once and side by side, before several jobs wait for the same."""
+    used = {case.method.replace("gauss6", "gauss4") for case in cases if case.engine == "analytic"}
+    names = [name for name in KERNELS if name in {"angle form", "vector form", "adaptive", *used}]
+    jobs = [job_of(compile_kernel, (name,), time_limit, name, cases[0].scene) for name in names]
     runner.run("compiled kernels", jobs, lambda _, fault: fault_record(fault))
 
 

@@ -37,14 +37,14 @@ _GROWTH_TO: Final = 1e-2
 _TELLING: Final = 16
 
 
-#: Kernels that a study needs, each with what compiles it: once on a machine, and side by side.
+#: Kernels, the slowest to compile first, each with what compiles it. The analytic engine's have its methods' names.
 KERNELS: Final[dict[str, Callable[[Scene], object]]] = {
     "angle form": lambda scene: next(solve_angles(scene, np.array([1e-9]))),
-    "vector form": lambda scene: next(solve_vectors(scene, np.array([1e-9]))),
     "adaptive": lambda scene: simulate(scene, "analytic", "adaptive", times=[1e-9]),
+    "vector form": lambda scene: next(solve_vectors(scene, np.array([1e-9]))),
     "rk4": lambda scene: simulate(scene, "analytic", "rk4", 1e-9, [1e-9]),
     "euler": lambda scene: simulate(scene, "analytic", "euler", 1e-9, [1e-9]),
-    "gauss": lambda scene: simulate(scene, "analytic", "gauss4", 1e-9, [1e-9]),
+    "gauss4": lambda scene: simulate(scene, "analytic", "gauss4", 1e-9, [1e-9]),
     "rattle": lambda scene: simulate(scene, "analytic", "rattle", 1e-9, [1e-9]),
 }
 
