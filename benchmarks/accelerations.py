@@ -238,6 +238,9 @@ def scene_table() -> None:
         truth = pb.reference(scene)
         run = pb.simulate(scene, engine="analytic", times=truth.t)
         whole = pb.simulate(scene, engine="analytic")
+        for failed in (run, whole):
+            if failed.status != "ok":
+                sys.exit(f"{name}: {failed.status}: {failed.reason}")
         found = energy(scene, whole.theta, whole.omega)
         drift = float(np.abs(found - found[0]).max() / energy_scale(scene))
         apart = distance(scene.lengths, truth.theta, truth.offset(run.theta))

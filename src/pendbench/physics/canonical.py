@@ -2,49 +2,54 @@
 
 from __future__ import annotations
 
-import math
-
 from pendbench.arrays import FloatArray
 from pendbench.compiled import inlined, specialise
 from pendbench.physics.system import System
+from pendbench.physics.trigonometry import write_bends, write_directions
 from pendbench.solvers import problem
+
+
+# The rows of a system's scratch, here.
+_COSINE, _SINE, _X, _Y = range(4)
+_P, _K = _X, _Y
+
+
+@inlined
+def _write_speeds(system: System, theta: FloatArray, omega: FloatArray) -> None:
+    """Leave the rods' directions and the masses' velocities in the scratch."""
+    lengths, scratch = system.lengths, system.scratch
+    write_directions(theta, scratch, _COSINE, _SINE)
+    x, y = 0.0, 0.0
+    for i in range(len(lengths)):
+        speed = lengths[i] * omega[i]
+        x += speed * scratch[_COSINE, i]
+        y += speed * scratch[_SINE, i]
+        scratch[_X, i], scratch[_Y, i] = x, y
 
 
 @inlined
 def write_momenta(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
     """Write p = C(theta) omega (n,) kg m^2/s into `out`: the momentum of the masses outside each rod, across it."""
-    masses, lengths = system.masses, system.lengths
-    vx, vy = system.scratch[0], system.scratch[1]
-    x, y = 0.0, 0.0
-    for i in range(len(masses)):
-        speed = lengths[i] * omega[i]
-        x += speed * math.cos(theta[i])
-        y += speed * math.sin(theta[i])
-        vx[i], vy[i] = x, y
+    masses, lengths, scratch = system.masses, system.lengths, system.scratch
+    _write_speeds(system, theta, omega)
     x, y = 0.0, 0.0
     for i in range(len(masses) - 1, -1, -1):
-        x += masses[i] * vx[i]
-        y += masses[i] * vy[i]
-        out[i] = lengths[i] * (math.cos(theta[i]) * x + math.sin(theta[i]) * y)
+        x += masses[i] * scratch[_X, i]
+        y += masses[i] * scratch[_Y, i]
+        out[i] = lengths[i] * (scratch[_COSINE, i] * x + scratch[_SINE, i] * y)
 
 
 @inlined
 def write_forces(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
     """Write dL/dtheta (n,) N m into `out`: minus the outer momentum along each moving rod, and the weight's torque."""
-    masses, lengths = system.masses, system.lengths
-    vx, vy = system.scratch[0], system.scratch[1]
-    x, y = 0.0, 0.0
-    for i in range(len(masses)):
-        speed = lengths[i] * omega[i]
-        x += speed * math.cos(theta[i])
-        y += speed * math.sin(theta[i])
-        vx[i], vy[i] = x, y
+    masses, lengths, scratch = system.masses, system.lengths, system.scratch
+    _write_speeds(system, theta, omega)
     x, y, hanging = 0.0, 0.0, 0.0
     for i in range(len(masses) - 1, -1, -1):
-        x += masses[i] * vx[i]
-        y += masses[i] * vy[i]
+        x += masses[i] * scratch[_X, i]
+        y += masses[i] * scratch[_Y, i]
         hanging += masses[i]
-        s, c = math.sin(theta[i]), math.cos(theta[i])
+        s, c = scratch[_SINE, i], scratch[_COSINE, i]
         out[i] = -lengths[i] * (omega[i] * (s * x - c * y) + hanging * system.gravity * s)
 
 
@@ -55,30 +60,30 @@ def write_rates(system: System, theta: FloatArray, momenta: FloatArray, out: Flo
     The recursion for a chain at rest, without weight, under torques p: a torque on a rod is a pair of forces across
     it at its ends (docs/equations.md).
     """
-    masses, lengths = system.masses, system.lengths
-    cosine, sine, p, k = system.scratch[0], system.scratch[1], system.scratch[2], system.scratch[3]
+    masses, lengths, scratch = system.masses, system.lengths, system.scratch
+    write_bends(theta, scratch, _COSINE, _SINE)
     tip = len(masses) - 1
     alpha, beta = masses[tip], 0.0
     outer = momenta[tip] / lengths[tip]
-    cosine[tip], sine[tip], p[tip], k[tip] = 1.0, 0.0, outer / masses[tip], 0.0
+    scratch[_COSINE, tip], scratch[_SINE, tip] = 1.0, 0.0
+    scratch[_P, tip], scratch[_K, tip] = outer / masses[tip], 0.0
     for i in range(tip - 1, -1, -1):
         m = masses[i]
-        bend = theta[i + 1] - theta[i]
-        c, s = math.cos(bend), math.sin(bend)
+        c, s = scratch[_COSINE, i], scratch[_SINE, i]
         inverse = 1.0 / (m + alpha * s * s)
         own = momenta[i] / lengths[i]
         across = own - c * outer
-        cosine[i], sine[i] = c, s
-        p[i] = (across + s * beta) * inverse
-        k[i] = s * c * alpha * inverse
-        beta = m * c * beta * inverse + s * outer - k[i] * across
+        passed = s * c * alpha * inverse
+        scratch[_P, i] = (across + s * beta) * inverse
+        scratch[_K, i] = passed
+        beta = m * c * beta * inverse + s * outer - passed * across
         alpha = m * (m + alpha) * inverse
         outer = own
     radial, transverse = 0.0, 0.0
     for i in range(tip + 1):
-        q = p[i] - k[i] * radial
+        q = scratch[_P, i] - scratch[_K, i] * radial
         out[i] = (q - transverse) / lengths[i]
-        c, s = cosine[i], sine[i]
+        c, s = scratch[_COSINE, i], scratch[_SINE, i]
         radial, transverse = c * radial + s * q, c * q - s * radial
 
 

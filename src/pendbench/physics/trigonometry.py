@@ -79,3 +79,15 @@ def write_bends(theta: FloatArray, out: FloatArray, cosine: int, sine: int) -> N
             bend, lost = _bend(theta[i], theta[i + 1])
             c, s = direction(bend)
             out[cosine, i], out[sine, i] = c - s * lost, s + c * lost
+
+
+@inlined
+def write_directions(theta: FloatArray, out: FloatArray, cosine: int, sine: int) -> None:
+    """Write cos and sin of theta (n,) into two rows of `out` (rows, n)."""
+    far = 0
+    for i in range(len(theta)):
+        out[cosine, i], out[sine, i] = cosine_sine(theta[i], 0.0)
+        far += int(not abs(theta[i]) <= FAR)
+    if far:
+        for i in range(len(theta)):
+            out[cosine, i], out[sine, i] = direction(theta[i])

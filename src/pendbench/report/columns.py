@@ -87,7 +87,10 @@ _WHAT: Final = {
         empty="its own",
     ),
     "tolerance": Column(
-        "1", ".1e", "tolerance", "the tolerance of a method that chooses its steps, interpolated; empty where not reached"
+        "1",
+        ".1e",
+        "tolerance",
+        "the tolerance of a method that chooses its steps (in prices.csv: interpolated, empty where not reached)",
     ),
     "settings": _text("settings", "settings of the method that differ from its defaults"),
     "status": _text("status", "how the case ended: as the worst of its starts did"),
@@ -223,6 +226,14 @@ _COSTS: Final = {
         "s", ".2g", "first call, s", "the first step of all, with what is compiled or loaded then", is_time=True
     ),
     "run_s": Column("s", ".3g", "run, s", "time spent stepping up to the horizon (or compare_s)", is_time=True),
+    "with_states_s": Column(
+        "s",
+        ".3g",
+        "with states, s",
+        "the same for a caller who looks at the state after every step (at the samples, of a method that chooses its "
+        "steps)",
+        is_time=True,
+    ),
     "digit_price": Column(
         "1", ".3g", "one more digit", "by what factor the cost grows where the error is to fall tenfold", is_time=True
     ),

@@ -37,7 +37,7 @@ Series = tuple[str, str, str, str]
 #: The settings that stand for a step in a method that chooses its own.
 _INSTEAD_OF_STEPS: Final = ("tolerance",)
 
-_ACCURACIES: Final = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)
+_ACCURACIES: Final = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
 _RUN_COLUMNS: Final = ("error_max", "angle_error_max_rad", "reference_error", "energy_drift_max", "gap_max", "steps")
 _TIMING_COLUMNS: Final = (
     "step_us", "step_spread", "step_and_state_us", "simulated_s_per_s", "build_s", "first_call_s", "run_s",
@@ -110,7 +110,13 @@ def series_of(case: Case) -> Series:
 
 def step_of(case: Case) -> float:
     """The step, s, or what stands for it: the smaller, the better and the dearer."""
-    return case.dt if case.dt is not None else dict(case.settings).get("tolerance", math.nan)
+    return tolerance_of(case) if case.dt is None else case.dt
+
+
+def tolerance_of(case: Case) -> float:
+    """The tolerance of a method that chooses its steps, its default where none is given; nan for other methods."""
+    settings = engine(case.engine).methods[case.method].with_defaults(dict(case.settings))
+    return settings.get("tolerance", math.nan) if case.dt is None else math.nan
 
 
 def _lasting(case: Case) -> tuple[tuple[str, float], ...]:
@@ -225,22 +231,27 @@ class _Cost:
             "reason": truth["reason"],
         }
 
-    def _points(self, cases: Sequence[Case]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Step, error (nan where the run failed) and time of each case that was measured and timed."""
+    def _points(self, cases: Sequence[Case]) -> FloatArray:
+        """Step, error, time, and time with a look at every state, (4, j), of each case that was measured and timed."""
         rows = [
-            (step_of(case), self.runs[case].get("error_max"), self.timings[case].get("run_s"))
+            (step_of(case), self.runs[case].get("error_max"), self.timings[case].get("run_s"), self._with_states(case))
             for case in cases
             if case in self.timings
         ]
         known = [[math.nan if value is None else value for value in row] for row in rows]
-        points = np.array(known, dtype=float).reshape(-1, 3)
-        points = points[np.isfinite(points[:, 0]) & np.isfinite(points[:, 2])]
-        return points[:, 0], points[:, 1], points[:, 2]
+        points = np.array(known, dtype=float).reshape(-1, 4)
+        return points[np.isfinite(points[:, 2])].T
+
+    def _with_states(self, case: Case) -> float:
+        """What a caller pays, s, who looks at the state after every step, or at every sample of a method without."""
+        window = self.options.windows[case.scene.name]
+        looks = window.samples if case.dt is None else max(1, round(window.time / case.dt))
+        return 1e-6 * self.timings[case].get("step_and_state_us", math.nan) * looks
 
     def _order_row(self, cases: Sequence[Case]) -> Record:
         first = cases[0]
         method = engine(first.engine).methods[first.method]
-        step, error, run_s = self._points(cases)
+        step, error, run_s, _ = self._points(cases)
         fit = None if method.adaptive or not len(step) else observed_order(step, error, _ERROR_FLOOR, _ERROR_CEILING)
         return {
             "scene": first.scene.name,
@@ -260,9 +271,9 @@ class _Cost:
     def _price_rows(self, cases: Sequence[Case]) -> Iterator[Record]:
         first = cases[0]
         adaptive = engine(first.engine).methods[first.method].adaptive
-        points = self._points(cases)
+        step, error, run_s, with_states_s = self._points(cases)
         for accuracy in self.options.accuracies:
-            price = price_of(accuracy, *points)
+            price = price_of(accuracy, step, error, run_s)
             yield {
                 "scene": first.scene.name,
                 "accuracy": accuracy,
@@ -272,6 +283,7 @@ class _Cost:
                 "dt": math.nan if adaptive else price.step,
                 "tolerance": price.step if adaptive else math.nan,
                 "run_s": price.run_s,
+                "with_states_s": price_of(accuracy, step, error, with_states_s).run_s,
                 "bound": price.bound,
                 "best_error": price.best,
             }
@@ -285,6 +297,7 @@ class _Cost:
             "engine": case.engine,
             "method": case.method,
             "dt": math.nan if case.dt is None else case.dt,
+            "tolerance": tolerance_of(case),
             "settings": case.settings_text,
             "status": "refused" if refused else run["status"],
             "reason": refused or run["reason"],
