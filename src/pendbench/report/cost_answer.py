@@ -47,7 +47,8 @@ def _who(prices: Prices, winners: _Winners) -> str:
         return f"{first} is the only engine that took part."
     if len(wins) == 1:
         span = _span([accuracy for accuracy in prices.accuracies if any(at == accuracy for _, at in winners)])
-        return f"{first} is the cheapest engine at {span}, in {_places(prices.scenes, prices.scenes)}."
+        every = "every accuracy from " if " to " in span else ""
+        return f"{first} is the cheapest engine at {every}{span}, in {_places(prices.scenes, prices.scenes)}."
     others = [f"{engine} {_wins(engine, prices, winners)}" for engine in wins if engine != first]
     return f"{first} is the cheapest engine in {most} of {len(winners)} pairs of scene and accuracy, {listed(others)}."
 
@@ -74,8 +75,8 @@ def _how(prices: Prices, winners: _Winners) -> str:
         total = sum(names[accuracy].total() for accuracy, _, _ in own)
         what = "scenes" if len(own) == 1 else "pairs of scene and accuracy"
         counts = f"in {sum(count for _, _, count in own)} of {total} {what}"
-        told.append(f"at {_span([accuracy for accuracy, _, _ in own])} {name} ({counts})")
-    return f"The method to take is most often {listed(told)}."
+        told.append(f"{name} at {_span([accuracy for accuracy, _, _ in own])} ({counts})")
+    return f"Cheapest method: {'; '.join(told)}."
 
 
 def _others(prices: Prices) -> str:
@@ -88,20 +89,18 @@ def _others(prices: Prices) -> str:
         return ""
     leader = wins.most_common(1)[0][0]
     told = [_compared(engine, leader, best, prices.scenes) for engine in prices.engines if engine != leader]
-    at = shown("accuracy", accuracy)
-    return f"To reach {at}, compared with the best of {leader}: {'; '.join(told)}."
+    return f"To reach {shown('accuracy', accuracy)}, compared with the best of {leader}, {'; '.join(told)}."
 
 
 def _compared(engine: str, leader: str, best: Mapping[tuple[str, str], Row], scenes: Sequence[str]) -> str:
     ratios = [number(best[scene, engine], "run_s") / number(best[scene, leader], "run_s")
               for scene in scenes if (scene, engine) in best and (scene, leader) in best]  # fmt: skip
     if not ratios:
-        return f"{engine} does not get there"
+        return f"{engine} cannot be: it does not get there"
     mean = math.exp(sum(map(math.log, ratios)) / len(ratios))
     low, high = number_text(min(ratios), ".2g"), number_text(max(ratios), ".2g")
-    span = "" if len(ratios) == 1 else f" (geometric mean of {len(ratios)} scenes, {low} to {high})"
-    where = f" in {[scene for scene in scenes if (scene, engine) in best][0]}" if len(ratios) == 1 < len(scenes) else ""
-    return f"the best of {engine} takes {number_text(mean, '.2g')} times as long{where}{span}"
+    of_what = f"geometric mean of {len(ratios)} scenes, {low} to {high}" if len(ratios) > 1 else "in one scene"
+    return f"the best of {engine} takes {number_text(mean, '.2g')} times as long ({of_what})"
 
 
 def _not_reached(prices: Prices) -> str:
@@ -116,10 +115,10 @@ def _not_reached(prices: Prices) -> str:
                     missed.setdefault(max(out), []).append(scene)
         if missed:
             places = [f"{shown('accuracy', at)} in {listed(missed[at])}" for at in sorted(missed, reverse=True)]
-            told.append(f"by {engine} {listed(places)}")
+            told.append(f"for {engine} {listed(places)}")
     if not told:
         return "With the steps of this study every engine reaches every accuracy in every scene."
-    return f"Not reached with the steps of this study, nor what is finer: {'; '.join(told)}."
+    return f"Out of reach with the steps of this study, and so is what is finer: {'; '.join(told)}."
 
 
 def _noise(prices: Prices) -> str:
@@ -139,5 +138,5 @@ def _places(scenes: Sequence[str], all_of: Sequence[str]) -> str:
     if len(scenes) == 1:
         return f"scene {scenes[0]}" if len(all_of) == 1 else scenes[0]
     if len(scenes) == len(all_of):
-        return f"all {len(scenes)} scenes"
+        return "both scenes" if len(scenes) == 2 else f"all {len(scenes)} scenes"
     return listed(scenes)

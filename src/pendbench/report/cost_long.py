@@ -1,0 +1,70 @@
+"""Long runs: what drifts, in words and in a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from pendbench.report import sections
+from pendbench.report.columns import NOTHING, number_text, shown
+from pendbench.report.rows import Row, distinct, in_order, is_ok, number, of, word
+from pendbench.report.text import markdown, table
+
+#: A slope that moves the energy by less than this share of its band is none.
+_NO_TREND: Final = 0.1
+#: Bands of two stretches of one motion differ by up to this factor, and mean nothing by it.
+_ALIKE: Final = 2.0
+
+READING: Final = """\
+A method that keeps the energy has a band and no slope: what its slope moves the energy by in the whole run is a small
+share of the band (below 0.1), and its last tenth has about the band of its first. "No drift" says that both hold, the
+second to a factor of 2 either way. A band that is much narrower at the end than at the beginning is no good sign: the
+energy has gone somewhere else first."""
+
+_NAMES: Final = (
+    "scene", "engine", "method", "dt", "steps", "energy_drift_max", "energy_drift_band", "energy_slope_share",
+    "energy_band_first_tenth", "energy_band_last_tenth",
+)  # fmt: skip
+
+
+def long_runs(rows: Sequence[Row]) -> str:
+    """A row for each long run, with the verdict."""
+    by_scene = [row for scene in distinct(rows, "scene") for row in in_order(of(rows, scene=scene))]
+    numbers = range(3, len(_NAMES))
+    headings = [*(sections.heading(name) for name in _NAMES), "verdict"]
+    lines = [[*(sections.cell(row, name) for name in _NAMES), _told(row)] for row in by_scene]
+    return table(headings, lines, numbers)
+
+
+def _told(row: Row) -> str:
+    verdict = verdict_of(row)
+    return f"**{markdown(verdict, 300)}**" if not is_ok(row) else markdown(verdict)
+
+
+def verdict_of(row: Row) -> str:
+    """What the energy of a long run does."""
+    if not is_ok(row):
+        steps = shown("steps", row.get("steps"))
+        return f"{word(row, 'status')} after {steps} steps: {word(row, 'reason') or 'no reason given'}"
+    share, slope = number(row, "energy_slope_share"), number(row, "energy_drift_slope_per_s")
+    band = number(row, "energy_drift_band")
+    if band == 0.0:
+        return "no drift: the energy does not change at all"
+    if not (math.isfinite(share) and math.isfinite(slope)):
+        return NOTHING
+    ends = number(row, "energy_band_last_tenth") / max(number(row, "energy_band_first_tenth"), 1e-300)
+    if share >= _NO_TREND:
+        rate = number_text(abs(slope) * 1e3, ".1e")
+        return f"{'gains' if slope > 0 else 'loses'} {rate} of the energy scale in 1000 s{_later(ends)}"
+    if ends > _ALIKE:
+        return f"no trend, but a band that grows {number_text(ends, '.2g')}-fold"
+    if ends < 1 / _ALIKE:
+        return f"leaves its energy by {shown('energy_drift_max', row.get('energy_drift_max'))} early, and stays there"
+    return "no drift"
+
+
+def _later(ends: float) -> str:
+    if ends > _ALIKE:
+        return f", and its band grows {number_text(ends, '.2g')}-fold"
+    return ", most of it early" if ends < 1 / _ALIKE else ", steadily"

@@ -1,0 +1,140 @@
+"""The tables of a study of kind `cost`: what to use, time to accuracy, orders, and looks at the state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from pendbench.report import sections
+from pendbench.report.columns import NOTHING, duration_text, is_missing, number_text, shown
+from pendbench.report.cost_prices import Prices, way, why_not
+from pendbench.report.cost_series import series
+from pendbench.report.rows import Row, distinct, finite, in_order, is_ok, method_name, number, of, word
+from pendbench.report.text import listed, markdown, table
+
+_ORDERS: Final = (
+    "scene", "engine", "method", "order_claimed", "order_observed", "plateau", "digit_price", "best_error",
+)  # fmt: skip
+
+
+def what_to_use(prices: Prices) -> str:
+    """One line for each scene and accuracy: the cheapest of all, and the best of each engine."""
+    headings = ["scene", "error up to", "use", "ms per simulated s"]
+    headings += [f"best of {markdown(engine)}, ms per simulated s" for engine in prices.engines]
+    lines = []
+    for scene in prices.scenes:
+        for accuracy in prices.accuracies:
+            best = prices.cheapest(scene, accuracy)
+            used = ["nothing gets there", NOTHING] if best is None else [f"**{markdown(way(best))}**", _cost(prices, best)]
+            own = [_best_of(prices, scene, accuracy, engine) for engine in prices.engines]
+            lines.append([markdown(scene), shown("accuracy", accuracy), *used, *own])
+    return table(headings, lines, (1, 3))
+
+
+def _cost(prices: Prices, row: Row) -> str:
+    return f"{_at_most(row)}{number_text(1e3 * prices.per_simulated_s(row), '.2g')}"
+
+
+def _at_most(row: Row) -> str:
+    """The sign of a price that is an upper bound."""
+    return "≤ " if str(row.get("bound")).lower() == "true" else ""
+
+
+def _best_of(prices: Prices, scene: str, accuracy: float, engine: str) -> str:
+    row = prices.cheapest(scene, accuracy, engine)
+    if row is None:
+        return markdown(why_not(prices, scene, engine))
+    return f"{_cost(prices, row)}: {markdown(way(row, with_engine=False))}"
+
+
+def time_to_accuracy(prices: Prices, scene: str) -> str:
+    """For one scene: each engine's time to each accuracy, how, and how many times that of the cheapest."""
+    headings = ["engine", *(f"to {shown('accuracy', accuracy)}" for accuracy in prices.accuracies)]
+    lines = []
+    for engine in prices.engines:
+        cells = []
+        for accuracy in prices.accuracies:
+            row = prices.cheapest(scene, accuracy, engine)
+            if row is None:
+                cells.append(markdown(why_not(prices, scene, engine)))
+            else:
+                cells.append(f"{_time(prices, row, accuracy)}: {markdown(way(row, with_engine=False))}")
+        lines.append([markdown(engine), *cells])
+    return table(headings, lines)
+
+
+def _time(prices: Prices, row: Row, accuracy: float) -> str:
+    """``≤ 2.3 ms (31×)``, bold where nothing is cheaper."""
+    best = prices.cheapest(word(row, "scene"), accuracy)
+    time = f"{_at_most(row)}{duration_text(number(row, 'run_s'))}"
+    if best is None or number(best, "run_s") == number(row, "run_s"):
+        return f"**{time}**"
+    return f"{time} ({number_text(number(row, 'run_s') / number(best, 'run_s'), '.2g')}×)"
+
+
+def every_method(prices: Prices, scene: str) -> str:
+    """For one scene: each method's time to each accuracy."""
+    headings = ["engine", "method", *(f"to {shown('accuracy', accuracy)}" for accuracy in prices.accuracies)]
+    lines = []
+    for own in series(in_order(of(prices.cases, scene=scene))):
+        first = own[0]
+        rows = of(prices.rows, scene=scene, engine=word(first, "engine"), method=word(first, "method"),
+                  settings=word(first, "settings"))  # fmt: skip
+        by_accuracy = {number(row, "accuracy"): row for row in rows}
+        cells = [_method_cell(prices, by_accuracy.get(accuracy, {}), own, accuracy) for accuracy in prices.accuracies]
+        lines.append([sections.cell(first, "engine"), markdown(method_name(first)), *cells])
+    return table(headings, lines)
+
+
+def _method_cell(prices: Prices, row: Row, cases: Sequence[Row], accuracy: float) -> str:
+    if math.isfinite(number(row, "run_s")):
+        return _time(prices, row, accuracy)
+    if math.isfinite(number(row, "best_error")):
+        return f"not reached (best {shown('best_error', row['best_error'])})"
+    statuses = distinct([case for case in cases if not is_ok(case)], "status")
+    return markdown(f"none measured ({listed(statuses)})") if statuses else "not timed"
+
+
+def orders(rows: Sequence[Row]) -> str:
+    """Orders claimed and seen, plateaus, the price of a digit, and the smallest error, by scene and method."""
+    by_scene = [row for scene in distinct(rows, "scene") for row in in_order(of(rows, scene=scene))]
+    return sections.rows_table([_order(row) for row in by_scene], _ORDERS)
+
+
+def _order(row: Row) -> dict[str, Any]:
+    """A row of orders as people read it."""
+    observed = shown("order_observed", row.get("order_observed"))
+    coarse, fine = (shown(name, row.get(name)) for name in ("order_dt_coarse", "order_dt_fine"))
+    price = number(row, "digit_price")
+    return {
+        **row,
+        "method": method_name(row),
+        "order_observed": NOTHING if is_missing(row.get("order_observed")) else f"{observed} ({coarse} to {fine} s)",
+        "digit_price": NOTHING if math.isnan(price) else f"{number_text(price, '.2g')}×",
+    }
+
+
+def looks(prices: Prices) -> Iterator[str]:
+    """What a caller pays who looks at the state after every step: by method and scene, and by accuracy."""
+    rows: dict[tuple[str, str], dict[str, str]] = {}
+    for own in series(in_order(prices.cases)):
+        key = word(own[0], "engine"), method_name(own[0])
+        rows.setdefault(key, {})[word(own[0], "scene")] = _look(own)
+    lines = [[markdown(engine), markdown(method), *(cells.get(scene, NOTHING) for scene in prices.scenes)]
+             for (engine, method), cells in rows.items()]  # fmt: skip
+    yield table(["engine", "method", *map(markdown, prices.scenes)], lines)
+
+
+def _look(cases: Sequence[Row]) -> str:
+    """``0.68 → 13.6 µs (20×)``: the medians over the steps."""
+    both, alone = finite(cases, "step_and_state_us"), finite(cases, "step_us")
+    if not both or not alone:
+        return NOTHING
+    dearer, cheaper = float(np.median(both)), float(np.median(alone))
+    if math.isnan(number(cases[0], "dt")):
+        return f"{shown('step_and_state_us', dearer)} µs a look"
+    times = number_text(dearer / cheaper, ".2g")
+    return f"{shown('step_us', cheaper)} → {shown('step_and_state_us', dearer)} µs ({times}×)"
