@@ -278,7 +278,7 @@ def test_the_bundled_scenes_are_chains_of_one_metre_and_one_kilogram() -> None:
 
 def test_an_unknown_name_lists_the_bundled_ones() -> None:
     message = complaint(load_scene, "dubble")
-    assert message.startswith("unknown scene 'dubble'; did you mean 'double'? allowed: chain10, ")
+    assert message.startswith("unknown scene 'dubble'; did you mean 'double'? allowed: a01, chain10, ")
     assert "rope100" in message
 
 

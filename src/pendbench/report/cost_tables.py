@@ -1,18 +1,16 @@
-"""The tables of a study of kind `cost`: what to use, time to accuracy, orders, and looks at the state."""
+"""The tables of a study of kind `cost`: what to use, time to accuracy, and orders."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
-
-import numpy as np
 
 from pendbench.report import sections
 from pendbench.report.columns import NOTHING, duration_text, is_missing, number_text, shown
 from pendbench.report.cost_prices import Prices, way, why_not
 from pendbench.report.cost_series import series
-from pendbench.report.rows import Row, distinct, finite, in_order, is_ok, method_name, number, of, word
+from pendbench.report.rows import Row, distinct, in_order, is_ok, method_name, number, of, word
 from pendbench.report.text import listed, markdown, table
 
 _ORDERS: Final = (
@@ -115,26 +113,3 @@ def _order(row: Row) -> dict[str, Any]:
         "order_observed": NOTHING if is_missing(row.get("order_observed")) else f"{observed} ({coarse} to {fine} s)",
         "digit_price": NOTHING if math.isnan(price) else f"{number_text(price, '.2g')}×",
     }
-
-
-def looks(prices: Prices) -> Iterator[str]:
-    """What a caller pays who looks at the state after every step: by method and scene, and by accuracy."""
-    rows: dict[tuple[str, str], dict[str, str]] = {}
-    for own in series(in_order(prices.cases)):
-        key = word(own[0], "engine"), method_name(own[0])
-        rows.setdefault(key, {})[word(own[0], "scene")] = _look(own)
-    lines = [[markdown(engine), markdown(method), *(cells.get(scene, NOTHING) for scene in prices.scenes)]
-             for (engine, method), cells in rows.items()]  # fmt: skip
-    yield table(["engine", "method", *map(markdown, prices.scenes)], lines)
-
-
-def _look(cases: Sequence[Row]) -> str:
-    """``0.68 → 13.6 µs (20×)``: the medians over the steps."""
-    both, alone = finite(cases, "step_and_state_us"), finite(cases, "step_us")
-    if not both or not alone:
-        return NOTHING
-    dearer, cheaper = float(np.median(both)), float(np.median(alone))
-    if math.isnan(number(cases[0], "dt")):
-        return f"{shown('step_and_state_us', dearer)} µs a look"
-    times = number_text(dearer / cheaper, ".2g")
-    return f"{shown('step_us', cheaper)} → {shown('step_and_state_us', dearer)} µs ({times}×)"

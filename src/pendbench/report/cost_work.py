@@ -1,0 +1,98 @@
+"""The figure of error against time: what each method gives for its cost, and the cheapest way to each error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendbench.report.cost_series import is_measured, series
+from pendbench.report.look import ENDED, Look, name_missing
+from pendbench.report.plots import GREY, bounds, logarithmic, panels
+from pendbench.report.rows import Row, finite, is_ok, method_name, number, word
+from pendbench.report.text import label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: What is drawn of errors: from below rounding to beyond the largest one there can be.
+ERRORS: Final = (1e-17, 10.0)
+
+
+def work_figure(look: Look, scene: str, cases: Sequence[Row]) -> Figure:
+    """Error against the cost of a simulated second, of every case of one scene."""
+    figure, (axes,) = panels(1, 1, 9.0, 7.2)
+    figure.suptitle(f"{label(scene)}: what accuracy costs", fontsize=12)
+    figure.supylabel("largest error, in lengths of the chain", fontsize=10)
+    axes.set_xlabel("ms of computing per simulated second")
+    groups = series(cases)
+    costs = {id(row): _cost(row, rows) for rows in groups for row in rows}
+    limits = bounds(finite(cases, "error_max"), *ERRORS)
+    logarithmic(axes, *limits)
+    logarithmic(axes, *bounds(list(costs.values()), 1e-9, 1e9), "x")
+    _draw_front(axes, [(costs[id(row)], _error(row)) for rows in groups for row in rows if is_measured(row)], limits[1])
+    for rows in groups:
+        draw_series(axes, look, rows, [costs[id(row)] for row in rows], limits)
+    shown = [row for rows in groups for row in rows if math.isfinite(costs[id(row)])]
+    name_missing(axes, [row for rows in groups for row in rows if row not in shown])
+    explain(figure, look, groups, extra=("cheapest",))
+    return figure
+
+
+def _error(row: Row) -> float:
+    return number(row, "error_max")
+
+
+def _cost(row: Row, its_series: Sequence[Row]) -> float:
+    """Ms for a simulated second; of a run that failed, what its steps would have cost at the price of the others."""
+    if is_measured(row):
+        return 1e3 * number(row, "run_s") / number(row, "compare_s")
+    prices, dt = finite(filter(is_measured, its_series), "step_us"), number(row, "dt")
+    return math.nan if is_ok(row) or not prices or math.isnan(dt) else 1e-3 * float(np.median(prices)) / dt
+
+
+def _draw_front(axes: Axes, points: Sequence[tuple[float, float]], top: float) -> None:
+    """Stairs along the points that nothing cheaper is as accurate as."""
+    costs, errors, best = [], [], math.inf
+    for cost, error in sorted(points):
+        if error < best:
+            costs, errors, best = [*costs, cost], [*errors, error], error
+    if costs:
+        style: dict[str, Any] = {"color": "black", "linewidth": 1.0, "zorder": 1, "drawstyle": "steps-post"}
+        axes.plot([costs[0], *costs, axes.get_xlim()[1]], [top, *errors, errors[-1]], **style)
+
+
+def draw_series(axes: Axes, look: Look, rows: Sequence[Row], places: Sequence[float], limits: tuple[float, float]) -> None:
+    """The cases of a series at their places along the axis, joined by a line; those that failed along the top."""
+    engine, method = word(rows[0], "engine"), method_name(rows[0])
+    colour = look.colour(engine, method)
+    good = [(x, min(max(_error(row), limits[0]), limits[1])) for x, row in zip(places, rows, strict=True)
+            if is_ok(row) and math.isfinite(x) and math.isfinite(_error(row))]  # fmt: skip
+    if good:
+        axes.plot(*zip(*good, strict=True), color=colour, linewidth=1.0, marker=look.marker(engine, method), markersize=5)
+    bad = [x for x, row in zip(places, rows, strict=True) if not is_ok(row) and math.isfinite(x)]
+    if bad:
+        axes.plot(bad, [limits[1]] * len(bad), color=colour, clip_on=False, zorder=5, **ENDED)
+
+
+def explain(figure: Figure, look: Look, groups: Sequence[Sequence[Row]], extra: Sequence[str] = ()) -> None:
+    """The legend below a figure: its methods, and what the other strokes mean."""
+    from matplotlib.lines import Line2D
+
+    methods = sorted({(word(rows[0], "engine"), method_name(rows[0])) for rows in groups})
+    handles = [Line2D([], [], color=look.colour(*both), marker=look.marker(*both), linewidth=1.0, markersize=5)
+               for both in methods]  # fmt: skip
+    names = [f"{label(engine, 20)} {label(method, 24)}" for engine, method in methods]
+    if "cheapest" in extra:
+        handles.append(Line2D([], [], color="black", linewidth=1.0))
+        names.append("cheapest way to each error")
+    if "order" in extra:
+        handles.append(Line2D([], [], color=GREY, linewidth=0.9, linestyle="--"))
+        names.append("claimed order")
+    if any(not is_ok(row) for rows in groups for row in rows):
+        handles.append(Line2D([], [], color=GREY, **ENDED))
+        names.append("failed with this step")
+    figure.legend(handles, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
