@@ -239,6 +239,7 @@ def test_fewer_than_two_steps_show_nothing():
 def test_errors_that_are_no_numbers_are_left_out():
     found = fit(TENTHS[:4], [math.inf, math.nan, 1e-4, 1e-6])
     assert found.order == pytest.approx(2.0)
+    assert fit(TENTHS[:3], [1e-2, 1e-4, math.inf]).order == pytest.approx(2.0)
     assert fit(TENTHS[:2], [math.nan, 1e-3]) is None
 
 

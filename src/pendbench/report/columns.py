@@ -126,7 +126,9 @@ _ERRORS: Final = {
         "L", ".1e", "e", "the largest distance of any mass from where it should be; empty past the horizon"
     ),
     "energy_error": Column("energy scale", ".1e", "energy error", "deviation of the energy from its first value"),
-    "error_max": Column("L", ".1e", "e max", "the largest e(t) up to the horizon (or compare_s), or to where the run ended"),
+    "error_max": Column(
+        "L", ".1e", "e max", "the largest e(t) up to the horizon (or compare_s), or to where the run ended"
+    ),
     "error_half": Column("L", ".1e", "e to half horizon", "the largest e(t) up to half of the horizon"),
     "angle_error_max_rad": Column(
         "rad", ".1e", "angle error", "the largest error of any angle, wrapped, up to the horizon (or compare_s)"
@@ -311,6 +313,11 @@ def duration_text(seconds: float) -> str:
         if seconds < 1e3 * size:
             return f"{number_text(seconds / size, '.2g')} {unit}"
     return f"{number_text(seconds, '.2g')} s" if math.isfinite(seconds) else NOTHING
+
+
+def times_text(ratio: float) -> str:
+    """How many times as much, to two digits, with its sign."""
+    return f"{number_text(ratio, '.2g')}\u00d7"
 
 
 def stored(name: str, value: Any) -> str | int | float:

@@ -31,7 +31,7 @@ SUMMARY: Final = (
 
 _SCENES: Final = ("scene", "n", "compare_s", "samples", "reference_error", "status")
 _USE: Final = """\
-The cheapest way to each error, and the best of each engine. Steps and tolerances are interpolated between those that
+The cheapest way to each error, and the best of each other engine. Steps and tolerances are interpolated between those that
 were run. "≤": the coarsest step that ran is as accurate already, so a coarser one might do."""
 _TIMES: Final = """\
 Stepping up to the time of comparison, and how many times as long as the cheapest (bold) that is. First the best of each

@@ -44,13 +44,14 @@ def _who(prices: Prices, winners: _Winners) -> str:
     wins = Counter(word(row, "engine") for row in winners.values())
     first, most = wins.most_common(1)[0]
     if len(prices.engines) == 1:
-        return f"{first} is the only engine that took part."
+        return f"The only engine that took part is {first}."
     if len(wins) == 1:
         span = _span([accuracy for accuracy in prices.accuracies if any(at == accuracy for _, at in winners)])
         every = "every accuracy from " if " to " in span else ""
-        return f"{first} is the cheapest engine at {every}{span}, in {_places(prices.scenes, prices.scenes)}."
+        return f"The cheapest engine is {first}: at {every}{span}, in {_places(prices.scenes, prices.scenes)}."
     others = [f"{engine} {_wins(engine, prices, winners)}" for engine in wins if engine != first]
-    return f"{first} is the cheapest engine in {most} of {len(winners)} pairs of scene and accuracy, {listed(others)}."
+    pairs = f"{most} of {len(winners)} pairs of scene and accuracy"
+    return f"No engine is the cheapest everywhere: {first} is in {pairs}, {listed(others)}."
 
 
 def _wins(engine: str, prices: Prices, winners: _Winners) -> str:

@@ -45,26 +45,30 @@ def _told(row: Row) -> str:
 def verdict_of(row: Row) -> str:
     """What the energy of a long run does."""
     if not is_ok(row):
-        steps = shown("steps", row.get("steps"))
-        return f"{word(row, 'status')} after {steps} steps: {word(row, 'reason') or 'no reason given'}"
-    share, slope = number(row, "energy_slope_share"), number(row, "energy_drift_slope_per_s")
-    band = number(row, "energy_drift_band")
-    if band == 0.0:
+        after = "" if math.isnan(number(row, "steps")) else f" after {shown('steps', row['steps'])} steps"
+        return f"{word(row, 'status')}{after}: {word(row, 'reason') or 'no reason given'}"
+    if number(row, "energy_drift_band") == 0.0:
         return "no drift: the energy does not change at all"
-    if not (math.isfinite(share) and math.isfinite(slope)):
+    share, first = number(row, "energy_slope_share"), number(row, "energy_band_first_tenth")
+    if math.isnan(share):
         return NOTHING
-    ends = number(row, "energy_band_last_tenth") / max(number(row, "energy_band_first_tenth"), 1e-300)
-    if share >= _NO_TREND:
-        rate = number_text(abs(slope) * 1e3, ".1e")
-        return f"{'gains' if slope > 0 else 'loses'} {rate} of the energy scale in 1000 s{_later(ends)}"
-    if ends > _ALIKE:
-        return f"no trend, but a band that grows {number_text(ends, '.2g')}-fold"
-    if ends < 1 / _ALIKE:
+    grows = number(row, "energy_band_last_tenth") / first if first > 0 else math.inf
+    return _trend(row, grows) if share >= _NO_TREND else _band(row, grows)
+
+
+def _trend(row: Row, grows: float) -> str:
+    """What a slope does. grows: how many times as wide the last tenth's band is as the first's."""
+    slope = number(row, "energy_drift_slope_per_s")
+    does = "gains" if slope > 0 else "loses"
+    if grows < 1 / _ALIKE:
+        return f"{does} energy, {shown('energy_drift_max', row.get('energy_drift_max'))} of its scale, most of it early"
+    rate = f"{does} {number_text(1e3 * abs(slope), '.1e')} of the energy scale in 1000 s"
+    return f"{rate}, and its band grows {number_text(grows, '.2g')}-fold" if grows > _ALIKE else f"{rate}, steadily"
+
+
+def _band(row: Row, grows: float) -> str:
+    if grows > _ALIKE:
+        return f"no trend, but a band that grows {number_text(grows, '.2g')}-fold"
+    if grows < 1 / _ALIKE:
         return f"leaves its energy by {shown('energy_drift_max', row.get('energy_drift_max'))} early, and stays there"
     return "no drift"
-
-
-def _later(ends: float) -> str:
-    if ends > _ALIKE:
-        return f", and its band grows {number_text(ends, '.2g')}-fold"
-    return ", most of it early" if ends < 1 / _ALIKE else ", steadily"

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from pendbench.report.columns import NOTHING, duration_text, number_text, shown
+from pendbench.report.columns import NOTHING, duration_text, number_text, shown, times_text
 from pendbench.report.cost_prices import Prices, way, why_not
 from pendbench.report.cost_series import series
 from pendbench.report.rows import Row, finite, in_order, method_name, number, of, word
@@ -16,19 +16,19 @@ from pendbench.report.text import listed, markdown, table
 
 _READING: Final = """\
 A call that takes many steps costs least. Who wants the state after each step calls the engine for each, and asks it:
-the table gives the median cost of a step alone → with a look at the state. For a method that chooses its steps it is
-one look, and the advance to it from the look before."""
+the table gives the median cost of a step alone → with a look at the state after it. For a method that chooses its
+steps it is that of one look, and of the advance to it from the look before."""
 
 
 def callers(prices: Prices, accuracy: float) -> Iterator[str]:
     """The section: how much dearer steps become, and who is the cheapest to an accuracy with a look at every state."""
     factors = {engine: _factors(of(prices.cases, engine=engine)) for engine in prices.engines}
-    told = [f"{engine} {_span(own)} times" for engine, own in factors.items() if own]
+    told = [f"{number_text(np.median(own), '.2g')} times for {engine}" for engine, own in factors.items() if own]
     if not told:
         yield "Nothing was timed."
         return
     yield _READING
-    yield markdown(f"With a look after each step, a step costs {listed(told)} as much as without.", 1000)
+    yield markdown(f"With a look after it, a step costs as much as without: {listed(told)}, in the median case.", 1000)
     yield _by_method(prices)
     yield (
         f"The cheapest way to an error of {shown('accuracy', accuracy)} for such a caller, and what it costs up to the "
@@ -44,11 +44,6 @@ def _factors(cases: Sequence[Row]) -> list[float]:
     return [factor for factor in factors if math.isfinite(factor)]
 
 
-def _span(values: Sequence[float]) -> str:
-    low, high = number_text(min(values), ".2g"), number_text(max(values), ".2g")
-    return low if low == high else f"{low} to {high}"
-
-
 def _by_method(prices: Prices) -> str:
     rows: dict[tuple[str, str], dict[str, str]] = {}
     for own in series(in_order(prices.cases)):
@@ -60,15 +55,15 @@ def _by_method(prices: Prices) -> str:
 
 
 def _look(cases: Sequence[Row]) -> str:
-    """``0.68 → 13.6 µs (20×)``: the medians over the steps."""
+    """How much dearer a look makes the steps of a method: the medians over its steps."""
     both, alone = finite(cases, "step_and_state_us"), finite(cases, "step_us")
     if not both or not alone:
         return NOTHING
     dearer, cheaper = float(np.median(both)), float(np.median(alone))
     if math.isnan(number(cases[0], "dt")):
         return f"{shown('step_and_state_us', dearer)} µs a look"
-    times = number_text(dearer / cheaper, ".2g")
-    return f"{shown('step_us', cheaper)} → {shown('step_and_state_us', dearer)} µs ({times}×)"
+    steps = f"{shown('step_us', cheaper)} → {shown('step_and_state_us', dearer)} µs"
+    return f"{steps} ({times_text(dearer / cheaper)})"
 
 
 def _by_engine(prices: Prices, accuracy: float) -> str:
@@ -92,5 +87,5 @@ def _cell(prices: Prices, scene: str, engine: str, best: Mapping[str, Row | None
         return markdown(why_not(prices, scene, engine))
     cost = number(row, "with_states_s")
     time = f"{duration_text(number(row, 'run_s'))} → {duration_text(cost)}"
-    time = f"**{time}**" if cost == least else f"{time} ({number_text(cost / least, '.2g')}×)"
+    time = f"**{time}**" if cost == least else f"{time} ({times_text(cost / least)})"
     return f"{time}: {markdown(way(row, with_engine=False))}"

@@ -24,11 +24,12 @@ WORK, STEPS, LONG = "work", "steps", "long"
 
 _CAPTIONS: Final = {
     WORK: "the largest error against the cost of a simulated second: further left is cheaper, further down is more "
-    "accurate. A hue for each engine, a shade and a marker for each method, a line along its steps. Black: the cheapest "
-    "way to each error. Crosses along the top: steps with which the run failed, at what they would have cost.",
+    "accurate. A hue for each engine, a shade and a marker for each method, a line along its steps. Black stairs: the "
+    "cheapest way to each error. Crosses along the top: steps with which the run failed, at what they would have cost.",
     STEPS: "the largest error against the step (the mean step of a method that chooses its own). Dashed: the orders "
     "that the methods claim. Crosses along the top: steps with which the run failed.",
-    LONG: "the largest energy error so far, in long runs of one step.",
+    LONG: "the largest energy error so far in long runs, a panel for each engine. Flat: the method keeps the energy in "
+    "a band. Rising: it drifts. Crosses: the run ended there, not well.",
 }
 
 
@@ -40,8 +41,7 @@ def pictures(results: Results) -> Iterator[Picture]:
     for scene in distinct(cases, "scene"):
         own = of(cases, scene=scene)
         if any(finite(own, "error_max")):
-            work = partial(work_figure, look, scene, own)
-            yield _picture(WORK, scene, names, draw(work))
+            yield _picture(WORK, scene, names, draw(partial(work_figure, look, scene, own)))
             yield _picture(STEPS, scene, names, draw(partial(steps_figure, look, scene, own, of(orders, scene=scene))))
     long_runs, curves = records(results.tables.get("long_runs")), records(results.tables.get("curves"))
     for scene in distinct(long_runs, "scene"):
@@ -55,7 +55,7 @@ def _picture(kind: str, scene: str, names: set[str], png: bytes) -> Picture:
 
 
 def _long(look: Look, runs: Sequence[Row], rows: Sequence[Row], names: set[str]) -> Iterator[Picture]:
-    """The energies of a scene's long runs: the largest error so far, since what swings through zero has no logarithm."""
+    """The energies of a scene's long runs: the largest error so far. What swings through zero has no logarithm."""
     scene = str(runs[0]["scene"])
     found = curves_of(rows, "energy_error", [{**row, "start": 0} for row in runs])
     curves = [replace(curve, y=list(accumulate(curve.y, max))) for curve in found]

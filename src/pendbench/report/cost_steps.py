@@ -66,6 +66,6 @@ def _draw_slope(axes: Axes, order: float, step: float, error: float) -> None:
     last = min(right, step * (top / error) ** (1 / order))
     ends = [first, last]
     axes.plot(ends, [error * (x / step) ** order for x in ends], color=GREY, linewidth=0.9, linestyle="--", zorder=0)
-    x = 10 ** (0.12 * math.log10(first) + 0.88 * math.log10(last))
-    axes.annotate(shown("order_claimed", order), (x, error * (x / step) ** order), fontsize=9, color=GREY,
-                  xytext=(-4, 2), textcoords="offset points", ha="right")  # fmt: skip
+    lowest = (first, error * (first / step) ** order)
+    name = f"order {shown('order_claimed', order)}"
+    axes.annotate(name, lowest, xytext=(5, 1), textcoords="offset points", fontsize=8, color=GREY, rotation=0)

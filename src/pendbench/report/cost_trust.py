@@ -48,9 +48,9 @@ def timings(cases: Sequence[Row]) -> Iterator[str]:
     limit = duration_text(SHORT)
     yield (
         f"{counted(len(short), 'case')} {'takes' if len(short) == 1 else 'take'} less than {limit} to the time of "
-        "comparison. Entering an engine from Python once takes some microseconds of that, which no repetition averages "
+        "comparison. Entering an engine from Python once takes some microseconds of that, which no repetition takes "
         "away: it is what a caller pays for so short a run, and not what the steps of a long one cost. To compare "
-        f"methods below {limit}, give their scene a later `time` in `[windows]` of the study's file, within its horizon."
+        f"methods below {limit}, give their scene a later `time` in `[windows]` of the study's file."
     )
     names = [f"- {markdown(case_name(row))}: {duration_text(number(row, 'run_s'))}" for row in short[:_LISTED]]
     if len(short) > _LISTED:

@@ -56,23 +56,27 @@ def _cost(row: Row, its_series: Sequence[Row]) -> float:
 
 def _draw_front(axes: Axes, points: Sequence[tuple[float, float]], top: float) -> None:
     """Stairs along the points that nothing cheaper is as accurate as."""
-    costs, errors, best = [], [], math.inf
+    front: list[tuple[float, float]] = []
     for cost, error in sorted(points):
-        if error < best:
-            costs, errors, best = [*costs, cost], [*errors, error], error
-    if costs:
+        if error > 0 and (not front or error < front[-1][1]):
+            front.append((cost, error))
+    if front:
+        ends = [(front[0][0], top), *front, (axes.get_xlim()[1], front[-1][1])]
         style: dict[str, Any] = {"color": "black", "linewidth": 1.0, "zorder": 1, "drawstyle": "steps-post"}
-        axes.plot([costs[0], *costs, axes.get_xlim()[1]], [top, *errors, errors[-1]], **style)
+        axes.plot(*zip(*ends, strict=True), **style)
 
 
-def draw_series(axes: Axes, look: Look, rows: Sequence[Row], places: Sequence[float], limits: tuple[float, float]) -> None:
+def draw_series(
+    axes: Axes, look: Look, rows: Sequence[Row], places: Sequence[float], limits: tuple[float, float]
+) -> None:
     """The cases of a series at their places along the axis, joined by a line; those that failed along the top."""
     engine, method = word(rows[0], "engine"), method_name(rows[0])
     colour = look.colour(engine, method)
     good = [(x, min(max(_error(row), limits[0]), limits[1])) for x, row in zip(places, rows, strict=True)
             if is_ok(row) and math.isfinite(x) and math.isfinite(_error(row))]  # fmt: skip
     if good:
-        axes.plot(*zip(*good, strict=True), color=colour, linewidth=1.0, marker=look.marker(engine, method), markersize=5)
+        marker = look.marker(engine, method)
+        axes.plot(*zip(*good, strict=True), color=colour, linewidth=1.0, marker=marker, markersize=5)
     bad = [x for x, row in zip(places, rows, strict=True) if not is_ok(row) and math.isfinite(x)]
     if bad:
         axes.plot(bad, [limits[1]] * len(bad), color=colour, clip_on=False, zorder=5, **ENDED)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import io
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from pendbench.study.api import Finished, Request
 
 _WIDTH = 160  # of tables in a log, where nothing says how wide it is
-OK, REGRESSION, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+OK, REGRESSION, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
 
 class _Parser(argparse.ArgumentParser):
@@ -149,5 +150,10 @@ def _tell(finished: Finished) -> int:
     return REGRESSION if finished.regressions else OK
 
 
+def _terminate(*_: object) -> None:
+    sys.exit(TERMINATED)  # an exception, so that the workers are stopped before
+
+
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, _terminate)
     sys.exit(main())

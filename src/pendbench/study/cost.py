@@ -240,13 +240,15 @@ class _Cost:
         ]
         known = [[math.nan if value is None else value for value in row] for row in rows]
         points = np.array(known, dtype=float).reshape(-1, 4)
-        return points[np.isfinite(points[:, 2])].T
+        timed: FloatArray = points[np.isfinite(points[:, 2])].T
+        return timed
 
     def _with_states(self, case: Case) -> float:
         """What a caller pays, s, who looks at the state after every step, or at every sample of a method without."""
         window = self.options.windows[case.scene.name]
-        looks = window.samples if case.dt is None else max(1, round(window.time / case.dt))
-        return 1e-6 * self.timings[case].get("step_and_state_us", math.nan) * looks
+        looks: int = window.samples if case.dt is None else max(1, round(window.time / case.dt))
+        look_us: float = self.timings[case].get("step_and_state_us", math.nan)
+        return 1e-6 * look_us * looks
 
     def _order_row(self, cases: Sequence[Case]) -> Record:
         first = cases[0]
