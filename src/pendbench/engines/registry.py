@@ -22,9 +22,12 @@ Factory = Callable[[], Engine]
 # table serves a source checkout, and keeps other packages from taking these names.
 _BUNDLED: Final = {
     "analytic": ("pendbench.engines.analytic:AnalyticEngine", "pendbench"),
+    "heyoka": ("pendbench.engines.heyoka:HeyokaEngine", "pendbench"),
     "mujoco": ("pendbench.engines.mujoco:MujocoEngine", "mujoco-core"),
     "pymunk": ("pendbench.engines.pymunk:PymunkEngine", "pymunk"),
 }
+# Those whose program comes with an extra of that package, of the same name.
+_EXTRAS: Final = frozenset({"heyoka"})
 _registered: dict[str, Factory] = {}
 
 
@@ -78,7 +81,8 @@ def _source(name: str) -> _Source:
         return _Source(name, lambda: _registered[name], None)
     if name in _BUNDLED:
         target, package = _BUNDLED[name]
-        return _Source(name, EntryPoint(name, target, GROUP).load, package)
+        wanted = f'"{package}[{name}]"' if name in _EXTRAS else package
+        return _Source(name, EntryPoint(name, target, GROUP).load, wanted)
     offers = {_package(entry): entry for entry in entry_points(group=GROUP, name=name)}
     if not offers:
         raise InputError(choose("engine", printable(str(name)), engine_names()))

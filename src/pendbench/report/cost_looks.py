@@ -23,12 +23,12 @@ steps it is that of one look, and of the advance to it from the look before."""
 def callers(prices: Prices, accuracy: float) -> Iterator[str]:
     """The section: how much dearer steps become, and who is the cheapest to an accuracy with a look at every state."""
     factors = {engine: _factors(of(prices.cases, engine=engine)) for engine in prices.engines}
-    told = [f"{number_text(np.median(own), '.2g')} times for {engine}" for engine, own in factors.items() if own]
+    told = [f"{number_text(np.median(own), '.2g')} times as much for {engine}" for engine, own in factors.items() if own]
     if not told:
         yield "Nothing was timed."
         return
     yield _READING
-    yield markdown(f"With a look after it, a step costs as much as without: {listed(told)}, in the median case.", 1000)
+    yield markdown(f"With a look after each, steps cost {listed(told)}, in the median case.", 1000)
     yield _by_method(prices)
     yield (
         f"The cheapest way to an error of {shown('accuracy', accuracy)} for such a caller, and what it costs up to the "

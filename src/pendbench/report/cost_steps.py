@@ -66,6 +66,6 @@ def _draw_slope(axes: Axes, order: float, step: float, error: float) -> None:
     last = min(right, step * (top / error) ** (1 / order))
     ends = [first, last]
     axes.plot(ends, [error * (x / step) ** order for x in ends], color=GREY, linewidth=0.9, linestyle="--", zorder=0)
-    lowest = (first, error * (first / step) ** order)
-    name = f"order {shown('order_claimed', order)}"
-    axes.annotate(name, lowest, xytext=(5, 1), textcoords="offset points", fontsize=8, color=GREY, rotation=0)
+    name, lowest = f"order {shown('order_claimed', order)}", (first, error * (first / step) ** order)
+    below = (5, -9) if first == left else (7, 2)  # of the line, but not of the panel
+    axes.annotate(name, lowest, xytext=below, textcoords="offset points", fontsize=8, color=GREY)

@@ -1,7 +1,8 @@
 """What a study found before, and whether it finds worse now. Times are never part of it.
 
-A baseline is a CSV file beside the study: for each case its status, its error and its energy drift. Where a study
-compares up to the horizon, that is up to half of it: later, chaos makes numbers of rounding.
+A baseline is a CSV file beside the study: for each case its status, its error and its energy drift, and the order that
+its method shows. Where a study compares up to the horizon, that is up to half of it: later, chaos makes numbers of
+rounding.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ _FLOORS: Final = {
 }
 #: Numbers for studies that do not have the other ones.
 _INSTEAD: Final = {"error_max": "error_half", "energy_drift_max": "energy_drift_half"}
+#: What is as bad where it falls as where it grows, and by how much it may differ. It is of all the steps of a method.
+_STAYS: Final = {"order_observed": 0.2}
 #: How much larger a number may be than it was. Other processors and libraries round otherwise; half as much again is
 #: no rounding.
 _BAND: Final = 1.5
@@ -42,7 +45,7 @@ def baseline_path(study: Path, *, quick: bool) -> Path:
 def write_baseline(path: Path, cases: pd.DataFrame) -> None:
     """Keep what the cases show as the baseline."""
     numbers = [name for name in _FLOORS if name in cases and _INSTEAD.get(name) not in cases]
-    columns = [*_KEYS, "status", *numbers]
+    columns = [*_KEYS, "status", *numbers, *(name for name in _STAYS if name in cases)]
     text = cases[columns].to_csv(index=False, float_format="%.6g", lineterminator="\n")
     write_whole(path, lambda file: file.write(text.encode()))
 
@@ -65,7 +68,7 @@ def _read(path: Path) -> pd.DataFrame:
     for name in (*_KEYS, "status"):
         if name not in table:
             raise ValueError(f"column {name!r} is missing")
-    for name in ("dt", *_FLOORS):
+    for name in ("dt", *_FLOORS, *_STAYS):
         if name in table:
             table[name] = pd.to_numeric(table[name].where(table[name] != ""))
     for status in table["status"]:
@@ -80,9 +83,10 @@ def _key(row: pd.Series) -> tuple[object, ...]:
     return row["scene"], row["engine"], row["method"], dt, settings
 
 
-def _name(row: pd.Series) -> str:
+def _name(row: pd.Series, *, with_step: bool = True) -> str:
     scene, engine, method, dt, settings = _key(row)
-    return " ".join(part for part in (scene, engine, method, dt and f"dt={dt}", settings) if part)  # type: ignore[misc]
+    step = f"dt={dt}" if dt and with_step else ""
+    return " ".join(part for part in (scene, engine, method, step, settings) if part)  # type: ignore[misc]
 
 
 def regressions(cases: pd.DataFrame, baseline: pd.DataFrame) -> list[str]:
@@ -99,12 +103,12 @@ def regressions(cases: pd.DataFrame, baseline: pd.DataFrame) -> list[str]:
             if (before["scene"], before["engine"]) in asked:
                 found.append(f"{_name(before)}: in the baseline, but not run")
             continue
-        found += _worse(_name(before), before, row)
-    return found
+        found += _worse(before, row)
+    return list(dict.fromkeys(found))
 
 
-def _worse(name: str, before: pd.Series, now: pd.Series) -> list[str]:
-    ranks = list(STATUSES)
+def _worse(before: pd.Series, now: pd.Series) -> list[str]:
+    name, ranks = _name(before), list(STATUSES)
     if ranks.index(now["status"]) > ranks.index(before["status"]):
         return [f"{name}: status was '{before['status']}', is '{now['status']}' ({now['reason']})"]
     found = []
@@ -115,4 +119,17 @@ def _worse(name: str, before: pd.Series, now: pd.Series) -> list[str]:
         value = float(now[column])
         if not value <= allowed:
             found.append(f"{name}: {column} was {before[column]:.3g}, is {value:.3g}; allowed up to {allowed:.3g}")
+    return found + _moved(before, now)
+
+
+def _moved(before: pd.Series, now: pd.Series) -> list[str]:
+    """What should have stayed where it was; one line for all the steps of a method."""
+    found, name = [], _name(before, with_step=False)
+    for column, most in _STAYS.items():
+        if column not in before or column not in now or pd.isna(before[column]):
+            continue
+        was, value = float(before[column]), float(now[column])
+        if not abs(value - was) <= most:
+            low, high = was - most, was + most
+            found.append(f"{name}: {column} was {was:.3g}, is {value:.3g}; allowed from {low:.3g} to {high:.3g}")
     return found
