@@ -15,9 +15,9 @@ import pandas as pd
 import pytest
 
 from pendbench.report.columns import COLUMNS, column
-from pendbench.study.chaos import times_of
+from pendbench.study.chaos import _ending, times_of
 from pendbench.study.plan import load_plan
-from tiny_study import Idle, Inline, Log, run, write_study
+from tiny_study import ENGINES, HEAD, Idle, Inline, Log, run, write_study
 
 #: What users and their scripts may rely on.
 FIXED = ["scene", "n", "engine", "method", "dt", "status", "reason"]
@@ -161,6 +161,32 @@ def test_a_study_that_was_killed_goes_on_where_it_was(study, two, tmp_path):
     assert 15 <= kept < sum(total for total, _ in log.stages.values())
     total, done = log.stages["compiled kernels"]
     assert total == done
+
+
+def test_a_scene_that_no_chosen_engine_is_for_is_left_out(tmp_path):
+    tables = ENGINES.replace('name    = "mujoco"', 'name    = "mujoco"\nscenes  = ["double_calm"]')
+    path = write_study(tmp_path, tables, HEAD.replace("starts        = 1", "starts        = 0"))
+    found = run(path, tmp_path / "out", Inline, engines=("mujoco",)).results
+    assert set(found.cases.scene) == set(found.tables["scenes"].scene) == {"double_calm"}
+
+
+@pytest.mark.parametrize(
+    ("statuses", "ending"),
+    [
+        (["ok", "ok"], ("ok", "")),
+        (["ok", "torn", "warned"], ("torn", "why 1 (start 1 of 2)")),
+        (["crashed", "error"], ("error", "why 1 (start 1 of 1)")),
+        (["not finite", "ok"], ("not finite", "why 0")),
+    ],
+)
+def test_a_case_ends_as_the_worst_of_its_starts(statuses, ending):
+    runs = [{"status": status, "reason": "" if status == "ok" else f"why {i}"} for i, status in enumerate(statuses)]
+    assert tuple(_ending(runs, None, {"horizon": 1.0}).values()) == ending
+    assert _ending([], "no such effect", {})["status"] == "refused"
+    assert _ending(runs, None, {"reason": "took too long"}) == {
+        "status": "error",
+        "reason": "no truth to compare with: took too long",
+    }
 
 
 def test_times_are_whole_steps_and_end_with_the_scene(study):

@@ -131,6 +131,21 @@ def test_only_the_engines_that_are_asked_for(write):
     assert "--engines: unknown engine 'pymonk'; did you mean 'pymunk'? allowed: analytic, pymunk (" in message
 
 
+def test_a_table_can_be_for_some_of_the_scenes(write):
+    own = ENGINE.replace("analytic", "mujoco") + 'scenes = ["triple"]'
+    path = write(changed('["double"]', '["double", "triple"]') + own)
+    assert [f"{case.scene.name} {case.engine}" for case in load_plan(path).cases] == [
+        "double analytic",
+        "triple analytic",
+        "triple mujoco",
+    ]
+    assert [case.scene.name for case in load_plan(path, engines=["mujoco"]).cases] == ["triple"]
+    wrong = own.replace("rk4", "rk5")
+    path.write_text(path.read_text().replace(own, wrong))
+    message = refusal(path, engines=["mujoco"])
+    assert " [engines number 2]: unknown method" in message, "the number is not the table's in the file"
+
+
 def test_scenes_are_found_beside_the_study(write, tmp_path, monkeypatch):
     (tmp_path / "own.toml").write_text((bundled("models") / "single.toml").read_text())
     path = write(changed('"double"', '"own.toml"'))
@@ -199,6 +214,15 @@ WRONG = {
         AT + "dt is given; allowed: no dt, since method 'adaptive' chooses its steps",
     ),
     "table twice": (GOOD + ENGINE, " [engines number 2]: asks twice for double analytic rk4 dt=0.01"),
+    "scenes of a table": (
+        GOOD + 'scenes = ["doubel"]',
+        AT + "scenes: unknown scene 'doubel'; did you mean 'double'? allowed: double (the study's scenes)",
+    ),
+    "empty scenes of a table": (GOOD + "scenes = []", AT + "scenes is an empty list; allowed: 1 or more entries"),
+    "a scene without engines": (
+        changed('["double"]', '["double", "triple"]') + 'scenes = ["triple"]',
+        ": scenes has 'double', and no table of [[engines]] is for it",
+    ),
     "setting": (
         changed("tolerance", "tolerence", ADAPTIVE),
         AT + "unknown key 'tolerence'; did you mean 'tolerance'? allowed: dt, methods,",

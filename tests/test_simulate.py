@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from installed import installed_engines
 from pendbench.engines.protocol import Fault, Method, Setting, State
-from pendbench.engines.registry import engine, engine_names
+from pendbench.engines.registry import engine
 from pendbench.errors import InputError
 from pendbench.physics.dense import accelerations
 from pendbench.recording import simulate
@@ -17,7 +18,7 @@ from tampered import Passing, Tampered, honest_build, wrapping
 SCENE = chain(2, angle=[0.5, 0.3], duration=1.0)
 STEPS = {"dt": 0.1, "times": np.arange(11) * 0.1}
 
-EVERY_METHOD = [(name, method) for name in engine_names() for method in engine(name).methods]
+EVERY_METHOD = [(name, method) for name in installed_engines() for method in engine(name).methods]
 
 
 @pytest.mark.parametrize(("name", "method"), EVERY_METHOD)

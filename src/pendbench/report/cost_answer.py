@@ -100,7 +100,9 @@ def _compared(engine: str, leader: str, best: Mapping[tuple[str, str], Row], sce
         return f"{engine} cannot be: it does not get there"
     mean = math.exp(sum(map(math.log, ratios)) / len(ratios))
     low, high = number_text(min(ratios), ".2g"), number_text(max(ratios), ".2g")
-    of_what = f"geometric mean of {len(ratios)} scenes, {low} to {high}" if len(ratios) > 1 else "in one scene"
+    of_what = f"geometric mean of {len(ratios)} scenes, {low} to {high}"
+    if low == high:
+        of_what = "in one scene" if len(ratios) == 1 else f"in each of {len(ratios)} scenes"
     return f"the best of {engine} takes {number_text(mean, '.2g')} times as long ({of_what})"
 
 

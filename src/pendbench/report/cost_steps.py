@@ -43,8 +43,10 @@ def steps_figure(look: Look, scene: str, cases: Sequence[Row], orders: Sequence[
 
 def _place(row: Row) -> float:
     """The step, or the mean of the steps that the method chose."""
-    dt = number(row, "dt")
-    return dt if math.isfinite(dt) else number(row, "compare_s") / number(row, "steps")
+    dt, steps = number(row, "dt"), number(row, "steps")
+    if math.isfinite(dt):
+        return dt
+    return number(row, "compare_s") / steps if steps > 0 else math.nan
 
 
 def _draw_orders(axes: Axes, cases: Sequence[Row], orders: Sequence[Row]) -> None:

@@ -95,7 +95,9 @@ class _Chaos:
 
     def __init__(self, plan: Plan, runner: Runner) -> None:
         self.plan, self.runner, self.options = plan, runner, plan.options
-        self.starts = {scene.name: starts_of(scene, self.options) for scene in plan.scenes}
+        asked = {case.scene.name for case in plan.cases}  # where not all engines are, some scenes may not be
+        self.scenes = [scene for scene in plan.scenes if scene.name in asked]
+        self.starts = {scene.name: starts_of(scene, self.options) for scene in self.scenes}
         self.truths: dict[tuple[str, int], Record] = {}
         self.exponents: dict[str, Record] = {}
         self.runs: dict[tuple[Case, int], Record] = {}
@@ -128,7 +130,7 @@ class _Chaos:
             scene.name: self._job(
                 measure_exponent, (scene.digest, self.options.lyapunov_time), scene, self.options.lyapunov_time
             )
-            for scene in self.plan.scenes
+            for scene in self.scenes
         }
         stage = distinct([*jobs, *exponents.values()])
         found = self.runner.run("the truth", stage, lambda _, fault: fault_record(fault))
@@ -185,7 +187,7 @@ class _Chaos:
             kind=self.options.kind,
             cases=pd.DataFrame(rows),
             tables={
-                "scenes": pd.DataFrame([self._scene_row(scene) for scene in self.plan.scenes]),
+                "scenes": pd.DataFrame([self._scene_row(scene) for scene in self.scenes]),
                 "causes": pd.DataFrame(causes.values()),
                 "starts": pd.DataFrame(self._start_rows()),
                 "curves": pd.DataFrame(self._curve_rows()),

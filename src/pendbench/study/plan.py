@@ -112,7 +112,10 @@ def load_plan(path_or_name: str | os.PathLike[str], *, quick: bool = False, engi
     if quick:
         where, options = f"{where} [quick]" if overlay else where, changed
     scenes = tuple(_scenes(where, options.scenes, path.parent))
-    cases = tuple(_cases(where, scenes, _selected(where, options.engines, engines)))
+    cases = tuple(_cases(scenes, _selected(where, options.engines, engines)))
+    idle = {scene.name for scene in scenes} - {case.scene.name for case in cases}
+    if idle and not engines:
+        raise input_error(where, f"scenes has {min(idle)!r}, and no table of [[engines]] is for it")
     plan = Plan(printable(path.stem), where, options, scenes, cases, quick)
     its.check(plan)
     return plan
@@ -131,17 +134,18 @@ def _scenes(where: str, names: Sequence[str], folder: Path) -> Iterator[Scene]:
         yield scene
 
 
-def _selected(where: str, tables: list[EngineTable], only: Sequence[str]) -> list[EngineTable]:
+def _selected(where: str, tables: list[EngineTable], only: Sequence[str]) -> list[tuple[str, EngineTable]]:
+    """The tables of the engines asked for, each with where it is."""
     known = {table.name for table in tables}
     for name in only:
         if name not in known:
             raise InputError(f"--engines: {choose('engine', printable(str(name)), known)} (the engines of {where})")
-    return [table for table in tables if not only or table.name in only]
+    places = ((f"{where} [engines number {number}]", table) for number, table in enumerate(tables, 1))
+    return [(at, table) for at, table in places if not only or table.name in only]
 
 
-def _cases(where: str, scenes: Sequence[Scene], tables: Sequence[EngineTable]) -> Iterator[Case]:
-    loaded = [(f"{where} [engines number {number}]", table) for number, table in enumerate(tables, 1)]
-    variants = [(at, table, list(_variants(at, table))) for at, table in loaded]
+def _cases(scenes: Sequence[Scene], tables: Sequence[tuple[str, EngineTable]]) -> Iterator[Case]:
+    variants = [(at, table, list(_variants(at, table))) for at, table in tables]
     known = [scene.name for scene in scenes]
     for at, table, _ in variants:
         if unknown := [name for name in table.scenes or () if name not in known]:
