@@ -123,9 +123,10 @@ def order(rows):
     step, error, run_s = _points(rows)
     first = rows[0]
     shown = len(step) > 1 and not math.isnan(first["dt"])
-    names = ("scene", "n", "engine", "method", "order_claimed", "order_observed", "plateau")
+    names = ("scene", "n", "engine", "method", "order_claimed", "plateau")
     return {
         **{name: first[name] for name in names},
+        "order_observed": first["order_observed"] if shown else NAN,
         "settings": "" if first["settings"].startswith("tolerance") else first["settings"],
         "order_dt_coarse": step[-2] if shown else NAN,
         "order_dt_fine": step[-1] if shown else NAN,

@@ -310,7 +310,7 @@ def number_text(value: Any, spec: str = ".3g") -> str:
 def duration_text(seconds: float) -> str:
     """A time for people, to the two digits that a timing is worth, in the unit of its size: ``38 µs``, ``2.3 ms``."""
     for unit, size in (("µs", 1e-6), ("ms", 1e-3)):
-        if seconds < 1e3 * size:
+        if seconds < 995 * size:  # what reads as 1000 is one of the next unit
             return f"{number_text(seconds / size, '.2g')} {unit}"
     return f"{number_text(seconds, '.2g')} s" if math.isfinite(seconds) else NOTHING
 

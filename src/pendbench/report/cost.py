@@ -35,7 +35,7 @@ The cheapest way to each error, and the best of each other engine. Steps and tol
 that were run. "≤": the coarsest step that ran is as accurate already, so a coarser one might do."""
 _TIMES: Final = """\
 Stepping up to the time of comparison, and how many times as long as the cheapest (bold) that is. First the best of each
-engine, then every method. What does not reach one error does not reach a smaller one either (–)."""
+engine, then every method: what does not reach one error does not reach a smaller one either."""
 _ORDERS: Final = """\
 The order with which the error falls, between which steps it was seen, and where it stops falling. One more digit: by
 what factor the cost grows for an error ten times smaller."""

@@ -30,7 +30,8 @@ def answer(results: Results) -> str:
             f"None of the {counted(len(prices.cases), 'case')} of this study reached an accuracy that it asks for in a "
             "time that was measured. The reasons are listed under what failed."
         )
-    told = [_who(prices, winners), _how(prices, winners), _others(prices), _not_reached(prices), _noise(prices)]
+    told = [_who(prices, winners), _how(prices, winners), _others(prices, winners), _not_reached(prices)]
+    told.append(_noise(prices))
     return " ".join(sentence for sentence in told if sentence)
 
 
@@ -55,13 +56,13 @@ def _who(prices: Prices, winners: _Winners) -> str:
 
 
 def _wins(engine: str, prices: Prices, winners: _Winners) -> str:
-    """Where one engine is the cheapest: ``at 1e-2 in double and triple``."""
-    told = []
-    for accuracy in prices.accuracies:
-        scenes = [scene for scene in prices.scenes if word(winners.get((scene, accuracy), {}), "engine") == engine]
-        if scenes:
-            told.append(f"at {shown('accuracy', accuracy)} in {_places(scenes, prices.scenes)}")
-    return listed(told)
+    """Where one engine is the cheapest: ``at 1e-2 to 1e-4 in double and triple``."""
+
+    def scenes(accuracy: float) -> list[str]:
+        return [scene for scene in prices.scenes if word(winners.get((scene, accuracy), {}), "engine") == engine]
+
+    groups = [(places, list(own)) for places, own in groupby(prices.accuracies, key=scenes)]
+    return listed([f"at {_span(own)} in {_places(places, prices.scenes)}" for places, own in groups if places])
 
 
 def _how(prices: Prices, winners: _Winners) -> str:
@@ -80,15 +81,16 @@ def _how(prices: Prices, winners: _Winners) -> str:
     return f"Cheapest method: {'; '.join(told)}."
 
 
-def _others(prices: Prices) -> str:
+def _others(prices: Prices, winners: _Winners) -> str:
     """How much longer the best of each other engine takes than the best of the one that is cheapest most often."""
     accuracy = compared_at(prices)
     best = {(scene, engine): row for scene in prices.scenes for engine in prices.engines
             if (row := prices.cheapest(scene, accuracy, engine)) is not None}  # fmt: skip
-    wins = Counter(word(row, "engine") for scene in prices.scenes if (row := prices.cheapest(scene, accuracy)))
-    if not wins or len(prices.engines) == 1:
+    here = Counter(word(row, "engine") for (_, at), row in winners.items() if at == accuracy)
+    all_told = Counter(word(row, "engine") for row in winners.values())
+    if not here or len(prices.engines) == 1:
         return ""
-    leader = wins.most_common(1)[0][0]
+    leader = max(prices.engines, key=lambda engine: (here[engine], all_told[engine]))
     told = [_compared(engine, leader, best, prices.scenes) for engine in prices.engines if engine != leader]
     return f"To reach {shown('accuracy', accuracy)}, compared with the best of {leader}, {'; '.join(told)}."
 

@@ -23,7 +23,9 @@ steps it is that of one look, and of the advance to it from the look before."""
 def callers(prices: Prices, accuracy: float) -> Iterator[str]:
     """The section: how much dearer steps become, and who is the cheapest to an accuracy with a look at every state."""
     factors = {engine: _factors(of(prices.cases, engine=engine)) for engine in prices.engines}
-    told = [f"{number_text(np.median(own), '.2g')} times as much for {engine}" for engine, own in factors.items() if own]
+    told = [
+        f"{number_text(np.median(own), '.2g')} times as much for {engine}" for engine, own in factors.items() if own
+    ]
     if not told:
         yield "Nothing was timed."
         return

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from pendbench.report.columns import shown
 from pendbench.report.cost_series import series
-from pendbench.report.cost_work import ERRORS, draw_series, explain
+from pendbench.report.cost_work import ERRORS, draw_series, explain, has_failed
 from pendbench.report.look import Look, name_missing
 from pendbench.report.plots import GREY, bounds, logarithmic, panels
-from pendbench.report.rows import Row, finite, method_name, number, of
+from pendbench.report.rows import Row, finite, is_ok, method_name, number, of
 from pendbench.report.text import label
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def steps_figure(look: Look, scene: str, cases: Sequence[Row], orders: Sequence[
         _draw_orders(axes, own, of(orders, engine=engine))
         for rows in series(own):
             draw_series(axes, look, rows, [_place(row) for row in rows], limits)
-        name_missing(axes, [row for row in own if math.isnan(_place(row))])
+        name_missing(axes, [row for row in own if math.isnan(_place(row)) or not (is_ok(row) or has_failed(row))])
     explain(figure, look, series(cases), extra=("order",))
     return figure
 
@@ -67,7 +67,7 @@ def _draw_slope(axes: Axes, order: float, step: float, error: float) -> None:
     first = max(left, step * (bottom / error) ** (1 / order))
     last = min(right, step * (top / error) ** (1 / order))
     ends = [first, last]
-    axes.plot(ends, [error * (x / step) ** order for x in ends], color=GREY, linewidth=0.9, linestyle="--", zorder=0)
+    axes.plot(ends, [error * (x / step) ** order for x in ends], color=GREY, linewidth=0.9, linestyle="--", zorder=1.6)
     name, lowest = f"order {shown('order_claimed', order)}", (first, error * (first / step) ** order)
     below = (5, -9) if first == left else (7, 2)  # of the line, but not of the panel
     axes.annotate(name, lowest, xytext=below, textcoords="offset points", fontsize=8, color=GREY)

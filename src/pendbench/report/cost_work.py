@@ -36,10 +36,14 @@ def work_figure(look: Look, scene: str, cases: Sequence[Row]) -> Figure:
     _draw_front(axes, [(costs[id(row)], _error(row)) for rows in groups for row in rows if is_measured(row)], limits[1])
     for rows in groups:
         draw_series(axes, look, rows, [costs[id(row)] for row in rows], limits)
-    shown = [row for rows in groups for row in rows if math.isfinite(costs[id(row)])]
-    name_missing(axes, [row for rows in groups for row in rows if row not in shown])
+    name_missing(axes, [row for rows in groups for row in rows if math.isnan(costs[id(row)])])
     explain(figure, look, groups, extra=("cheapest",))
     return figure
+
+
+def has_failed(row: Row) -> bool:
+    """Whether a run was begun and did not end well: a refusal is no matter of the step."""
+    return not is_ok(row) and word(row, "status") != "refused"
 
 
 def _error(row: Row) -> float:
@@ -51,7 +55,8 @@ def _cost(row: Row, its_series: Sequence[Row]) -> float:
     if is_measured(row):
         return 1e3 * number(row, "run_s") / number(row, "compare_s")
     prices, dt = finite(filter(is_measured, its_series), "step_us"), number(row, "dt")
-    return math.nan if is_ok(row) or not prices or math.isnan(dt) else 1e-3 * float(np.median(prices)) / dt
+    known = has_failed(row) and prices and math.isfinite(dt)
+    return 1e-3 * float(np.median(prices)) / dt if known else math.nan
 
 
 def _draw_front(axes: Axes, points: Sequence[tuple[float, float]], top: float) -> None:
@@ -62,7 +67,7 @@ def _draw_front(axes: Axes, points: Sequence[tuple[float, float]], top: float) -
             front.append((cost, error))
     if front:
         ends = [(front[0][0], top), *front, (axes.get_xlim()[1], front[-1][1])]
-        style: dict[str, Any] = {"color": "black", "linewidth": 1.0, "zorder": 1, "drawstyle": "steps-post"}
+        style: dict[str, Any] = {"color": "black", "linewidth": 1.0, "zorder": 1.7, "drawstyle": "steps-post"}
         axes.plot(*zip(*ends, strict=True), **style)
 
 
@@ -77,7 +82,7 @@ def draw_series(
     if good:
         marker = look.marker(engine, method)
         axes.plot(*zip(*good, strict=True), color=colour, linewidth=1.0, marker=marker, markersize=5)
-    bad = [x for x, row in zip(places, rows, strict=True) if not is_ok(row) and math.isfinite(x)]
+    bad = [x for x, row in zip(places, rows, strict=True) if has_failed(row) and math.isfinite(x)]
     if bad:
         axes.plot(bad, [limits[1]] * len(bad), color=colour, clip_on=False, zorder=5, **ENDED)
 
@@ -96,7 +101,7 @@ def explain(figure: Figure, look: Look, groups: Sequence[Sequence[Row]], extra: 
     if "order" in extra:
         handles.append(Line2D([], [], color=GREY, linewidth=0.9, linestyle="--"))
         names.append("claimed order")
-    if any(not is_ok(row) for rows in groups for row in rows):
+    if any(has_failed(row) for rows in groups for row in rows):
         handles.append(Line2D([], [], color=GREY, **ENDED))
         names.append("failed with this step")
     figure.legend(handles, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
