@@ -119,13 +119,18 @@ def test_a_status_is_worse_only_after_the_one_before(before):
 def test_a_case_that_is_gone_is_named_unless_it_was_not_asked_for(baseline):
     assert regressions(CASES.drop(index=1), baseline) == ["double mujoco rk4 dt=0.001: in the baseline, but not run"]
     assert regressions(CASES[CASES.engine == "mujoco"], baseline) == []
-    assert regressions(CASES[CASES.scene == "double"], baseline) == []
     assert regressions(CASES.iloc[:0], baseline) == []
 
 
-def test_a_case_that_is_new_is_no_regression(baseline):
+def test_a_scene_that_is_gone_is_named(baseline):
+    gone = regressions(CASES[CASES.scene == "double"], baseline)
+    assert gone
+    assert all(line.endswith("in the baseline, but not run") for line in gone)
+
+
+def test_a_case_without_a_baseline_is_named(baseline):
     new = CASES.iloc[[0]].assign(dt=1e-4, error_half=1.0)
-    assert regressions(pd.concat([CASES, new]), baseline) == []
+    assert regressions(pd.concat([CASES, new]), baseline) == ["double mujoco rk4 dt=0.0001: not in the baseline"]
 
 
 def test_a_quick_study_has_a_baseline_of_its_own(tmp_path):

@@ -152,11 +152,10 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys,
 def test_a_folder_that_cannot_be_written_is_one_line(study, capsys):
     folder = study.parent
     before = files(folder)
-    assert (
-        refused(capsys, study, "--out", study) == f"--out {study}: File exists; allowed: a folder that can be written"
-    )
-    below = study / "results"
-    assert refused(capsys, study, "--out", below).startswith(f"--out {below}: Not a directory; allowed: a folder that")
+    for out in (study, study / "results"):
+        expected = f"--out {out}: is or lies below a file; allowed: a folder that can be written"
+        assert refused(capsys, study, "--out", out) == expected
+    assert refused(capsys, study, "--out", "") == "--out is empty; allowed: a folder"
     long = folder / ("x" * 300)
     assert "File name too long; allowed: a folder that can be written" in refused(capsys, study, "--out", long)
     assert files(folder) == before

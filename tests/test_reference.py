@@ -160,7 +160,7 @@ def test_truth_of_a_chaotic_chain_ends_at_its_horizon(chain10):
 def test_horizon_hardly_depends_on_the_tolerance(chain10, monkeypatch):
     """A tenfold tolerance costs the time in which errors grow tenfold, a twentieth of the horizon here."""
     fine, scene = chain10, load_scene("chain10")
-    monkeypatch.setattr(truth, "_TOLERANCE", 10 * truth._TOLERANCE)
+    monkeypatch.setattr(truth, "_TOLERANCES", (10 * truth._TOLERANCES[0],))
     coarse = reference(scene, SAMPLES)
     assert abs(fine.horizon - coarse.horizon) < 0.3
     # Before it, the two agree as well as the one that knows less says.
@@ -221,3 +221,22 @@ def test_one_number_is_one_time():
 def test_bad_times_are_refused(times):
     with pytest.raises(InputError, match=r"^times cannot be used; allowed: "):
         reference(chain(1), times)
+
+
+def test_whole_turns_change_nothing():
+    """The physics does not know them; an angle of 1e6 rad would cost six digits, and the solves their tolerance."""
+    scene, times = load_scene("double"), np.linspace(0.0, 1.0, 11)
+    turns = np.array([159155.0, -3.0])
+    plain = reference(scene, times)
+    turned = reference(scene.with_start(scene.angles + 2 * np.pi * turns, scene.rates), times)
+    assert turned.horizon == 1.0
+    moved = turned.theta - 2 * np.pi * turns - plain.theta
+    # the start itself was rounded to a double of 1e6
+    assert np.abs(moved).max() < 1e-8
+
+
+def test_light_and_heavy_masses_still_have_a_truth():
+    """With a ratio of 1e6 the tightest tolerance cannot be met; a looser one can, and still is far below a double."""
+    found = reference(chain(2, mass=[1.0, 1e6]), np.linspace(0.0, 0.2, 3))
+    assert found.horizon == 0.2
+    assert found.error < 1e-15

@@ -31,7 +31,7 @@ _MOST_STEPS: Final = 2**53  # beyond this, floats do not count
 
 
 @dataclass(frozen=True)
-class Plan:
+class Asked:
     """What is to be run, checked: every name is known, every number allowed.
 
     times: (k,) s. steps: (k,) how many steps each of them is from the start; None for an adaptive method, and dt too.
@@ -77,7 +77,7 @@ def plan(
     dt: float | None,
     times: npt.ArrayLike | None,
     settings: Mapping[str, float | None],
-) -> Plan:
+) -> Asked:
     """Check what `simulate` was asked for. Raises `InputError`."""
     chosen = scene if isinstance(scene, Scene) else load_scene(scene)
     its = engine_of(engine) if isinstance(engine, str) else engine
@@ -92,9 +92,9 @@ def plan(
     if step is None:
         if asked is None:
             asked = np.linspace(0.0, chosen.duration, SAMPLES + 1)
-        return Plan(chosen, its, name, None, asked, None, numbers)
+        return Asked(chosen, its, name, None, asked, None, numbers)
     counts = _even_counts(chosen.duration, step) if asked is None else _counts(asked, step)
-    return Plan(chosen, its, name, step, np.asarray(counts * step, np.float64), counts, numbers)
+    return Asked(chosen, its, name, step, np.asarray(counts * step, np.float64), counts, numbers)
 
 
 def _settings(name: str, method: Method, given: Mapping[str, float | None]) -> dict[str, float]:
@@ -166,7 +166,7 @@ def _bounded(counts: FloatArray, dt: float) -> FloatArray:
     return counts
 
 
-def record(asked: Plan) -> Trajectory:
+def record(asked: Asked) -> Trajectory:
     """Run what a plan says. Whatever the engine does, it ends in a trajectory and not in an exception."""
     samples = Samples(asked.scene.n)
     try:
@@ -179,7 +179,7 @@ def record(asked: Plan) -> Trajectory:
     return samples.trajectory(fault)
 
 
-def _fill(samples: Samples, asked: Plan) -> Fault | None:
+def _fill(samples: Samples, asked: Asked) -> Fault | None:
     run = asked.engine.build(asked.scene, asked.method, asked.dt, **asked.settings)
     for i, time in enumerate(asked.times):
         if asked.steps is None:

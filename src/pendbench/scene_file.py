@@ -21,7 +21,7 @@ Angle = Annotated[float, ANGLE]
 Rate = Annotated[float, RATE]
 
 
-def _title(text: str) -> str:
+def one_line_title(text: str) -> str:
     if not (text.isprintable() and 1 <= len(text) <= 200):
         raise ValueError("one line of 1 to 200 characters")
     return text
@@ -78,7 +78,7 @@ class Start(Table):
 class SceneFile(Table):
     """A scene file. Without a `title` the scene's name is its title; an effect that is not named does not act."""
 
-    title: Annotated[str, AfterValidator(_title)] | None = None
+    title: Annotated[str, AfterValidator(one_line_title)] | None = None
     duration: Annotated[float, DURATION]
     chain: Chain
     start: Start

@@ -1,15 +1,15 @@
 """heyoka as an engine: Taylor's method on the O(n) recursion, differentiated and compiled for each chain.
 
 heyoka takes its step from the last two terms of the series of its state. For a chain released at rest from the
-horizontal, every fourth order of angles and rates together is zero; then, at orders 8, 12, 16 and 20 (its default
-tolerance), the first step has no bound: double.toml is off by 4e-3 after 1 s, without a word. So the direction of the
-first rod is part of the state: its sine and cosine have terms where the others have none.
+horizontal, two of every four orders in a row are zero in all angles and rates. So at orders 8, 12, 16 and 20 (its
+default tolerance) the first step has no bound: double.toml is off by 4e-3 after 1 s, without a word. That is why the
+direction of the first rod is part of the state: its sine and cosine have terms where the others have none.
 
-Measured with heyoka 7.13.2, n = 2, 10 and 50, orders 8 to 20. A step in machine code that is unrolled over links and
-orders takes half the time of one in compact code. fast_math saves 5 to 25 % of the unrolled and costs 40 % of the
-compact; no error shows its rounding. The dense form of n = 2 took 20 to 30 % longer, the accelerations as
-`physics.recursion` has them 20 to 100 %. All directions as state, vectorisation (slp_vectorize) and optimisation beyond
-level 1 gained nothing; high_accuracy cost 5 to 15 % and gained no digit.
+Measured with heyoka 7.13.2, n = 2, 10, 50 and 100, orders 8 to 20. A step in machine code that is unrolled over links
+and orders takes half the time of one in compact code. fast_math saves 5 to 25 % of the unrolled and costs the compact
+up to 40 %; no error shows its rounding. The dense form of n = 2 took 20 to 30 % longer, (E17) to (E19) written out 30
+to 140 %. All directions as state, vectorisation (slp_vectorize) and optimisation beyond level 1 gained nothing;
+high_accuracy cost 5 to 15 % and gained no digit.
 """
 
 from __future__ import annotations

@@ -8,7 +8,6 @@ from pendbench.physics.system import System
 from pendbench.physics.trigonometry import write_bends, write_directions
 from pendbench.solvers import problem
 
-
 # The rows of a system's scratch, here.
 _COSINE, _SINE, _X, _Y = range(4)
 _P, _K = _X, _Y

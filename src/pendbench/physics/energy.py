@@ -6,18 +6,25 @@ Never from an engine, and never from the matrices of the equations of motion: th
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
+from pendbench.errors import InputError
 from pendbench.physics import dense
 from pendbench.physics.geometry import positions, velocities
-from pendbench.scene import Scene
+from pendbench.scene import Scene, load_scene
 
 
-def energy(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
+def energy(scene: Scene | str, theta: npt.ArrayLike, omega: npt.ArrayLike) -> FloatArray:
     """Kinetic plus potential energy, (...,) J; the potential is zero at the pivot's height. equations.md (E3), (E4).
 
-    theta: (..., n) rad; omega: (..., n) rad/s.
+    scene: a `Scene`, or the name or path of one. theta: (..., n) rad; omega: (..., n) rad/s. Raises InputError where
+    the two have other shapes than that.
     """
+    scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    theta, omega = np.asarray(theta, np.float64), np.asarray(omega, np.float64)
+    if theta.shape != omega.shape or theta.shape[-1:] != (scene.n,):
+        raise InputError(f"theta {theta.shape} and omega {omega.shape}; allowed: the same shape, (..., {scene.n})")
     return kinetic_energy(scene, theta, omega) + potential_energy(scene, theta)
 
 

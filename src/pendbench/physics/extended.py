@@ -15,8 +15,10 @@ import numpy as np
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, specialise
 from pendbench.scene import Scene
-from pendbench.solvers.double_double import add, divide, multiply, scale, sine_cosine, subtract
+from pendbench.solvers.double_double import PI, add, divide, multiply, scale, sine_cosine, split, subtract, two_product
 from pendbench.solvers.extrapolation import extended_derivative
+
+_TURN = split(2 * PI, 3)  # 2 pi in three parts
 
 
 class AngleForm(NamedTuple):
@@ -44,9 +46,29 @@ def _arguments(scene: Scene) -> tuple[FloatArray, FloatArray, float, FloatArray]
 
 
 def angle_form(scene: Scene) -> tuple[AngleForm, FloatArray]:
-    """The system and its state (2 n, 2) at the scene's start."""
+    """The system and its state (2 n, 2) at the scene's start, without whole turns: they would cost digits."""
     start = np.concatenate([scene.angles, scene.rates])
-    return AngleForm(*_arguments(scene)), np.stack([start, np.zeros_like(start)], axis=1)
+    state = np.stack([start, np.zeros_like(start)], axis=1)
+    return AngleForm(*_arguments(scene)), _turned(state, -_whole_turns(scene))
+
+
+def with_whole_turns(scene: Scene, state: FloatArray) -> FloatArray:
+    """A state (2 n, 2) of the angle form with the turns that `angle_form` left out, as a new array."""
+    return _turned(state.copy(), _whole_turns(scene))
+
+
+def _whole_turns(scene: Scene) -> FloatArray:
+    return np.rint(scene.angles / (2 * math.pi))
+
+
+def _turned(state: FloatArray, turns: FloatArray) -> FloatArray:
+    """The state (2 n, 2) with `turns` (n,) added to its angles, in place."""
+    for i in np.flatnonzero(turns):
+        angle = (state[i, 0], state[i, 1])
+        for part in _TURN:
+            angle = add(angle, two_product(float(turns[i]), part))
+        state[i] = angle
+    return state
 
 
 def vector_form(scene: Scene) -> tuple[VectorForm, FloatArray]:

@@ -47,6 +47,9 @@ def verdict_of(row: Row) -> str:
     if not is_ok(row):
         after = "" if math.isnan(number(row, "steps")) else f" after {shown('steps', row['steps'])} steps"
         return f"{word(row, 'status')}{after}: {word(row, 'reason') or 'no reason given'}"
+    if number(row, "energy_drift_max") > 1.0:
+        times = shown("energy_drift_max", row["energy_drift_max"])
+        return f"blows up: its energy goes {times} times its scale astray, and the run says nothing of it"
     if number(row, "energy_drift_band") == 0.0:
         return "no drift: the energy does not change at all"
     share, first = number(row, "energy_slope_share"), number(row, "energy_band_first_tenth")
@@ -62,8 +65,9 @@ def _trend(row: Row, grows: float) -> str:
     does = "gains" if slope > 0 else "loses"
     if grows < 1 / _ALIKE:
         return f"{does} energy, {shown('energy_drift_max', row.get('energy_drift_max'))} of its scale, most of it early"
-    rate = f"{does} {number_text(1e3 * abs(slope), '.1e')} of the energy scale in 1000 s"
-    return f"{rate}, and its band grows {number_text(grows, '.2g')}-fold" if grows > _ALIKE else f"{rate}, steadily"
+    seconds = number(row, "steps") * number(row, "dt")
+    told = f"{does} {number_text(seconds * abs(slope), '.1e')} of the energy scale in {number_text(seconds)} s"
+    return f"{told}, and its band grows {number_text(grows, '.2g')}-fold" if grows > _ALIKE else f"{told}, steadily"
 
 
 def _band(row: Row, grows: float) -> str:

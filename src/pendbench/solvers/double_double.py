@@ -21,7 +21,7 @@ from pendbench.compiled import as_written
 Number = tuple[float, float]
 
 # pi to 75 digits, as a fraction.
-_PI = Fraction(
+PI = Fraction(
     3_141592653589793238462643383279502884197169399375105820974944592307816406286,
     10**75,
 )
@@ -46,7 +46,7 @@ def _series(x: Fraction, first: int) -> Fraction:
 
 
 def _table(first: int) -> FloatArray:
-    step = Fraction(round(_PI / 16 * 10**50), 10**50)
+    step = Fraction(round(PI / 16 * 10**50), 10**50)
     return np.array([split(_series(j * step, first)) for j in range(_ANGLES)])
 
 
@@ -56,8 +56,8 @@ def _coefficients(first: int) -> FloatArray:
 
 _SINES, _COSINES = _table(1), _table(0)
 _SINE_SERIES, _COSINE_SERIES = _coefficients(1), _coefficients(0)
-_PER_STEP = float(16 / _PI)
-_STEP_1, _STEP_2, _STEP_3 = split(_PI / 16, 3)
+_PER_STEP = float(16 / PI)
+_STEP_1, _STEP_2, _STEP_3 = split(PI / 16, 3)
 
 
 def _multiply_add(typingctx: Any, a: Any, b: Any, c: Any) -> Any:  # noqa: ARG001
@@ -88,7 +88,7 @@ def _fast_two_sum(a: float, b: float) -> Number:
 
 
 @as_written
-def _two_product(a: float, b: float) -> Number:
+def two_product(a: float, b: float) -> Number:
     """The rounded a b, and its error, exactly."""
     p = a * b
     return p, _fma(a, b, -p)
@@ -112,14 +112,14 @@ def subtract(a: Number, b: Number) -> Number:
 @as_written
 def multiply(a: Number, b: Number) -> Number:
     """A b."""
-    p, e = _two_product(a[0], b[0])
+    p, e = two_product(a[0], b[0])
     return _fast_two_sum(p, e + (a[0] * b[1] + a[1] * b[0]))
 
 
 @as_written
 def scale(a: Number, b: float) -> Number:
     """A b, where b is one double."""
-    p, e = _two_product(a[0], b)
+    p, e = two_product(a[0], b)
     return _fast_two_sum(p, e + a[1] * b)
 
 
@@ -145,9 +145,9 @@ def _polynomial(coefficients: FloatArray, x: Number) -> Number:
 def sine_cosine(a: Number) -> tuple[Number, Number]:
     """Sin a and cos a, for |a| up to 1e9."""
     multiple = np.rint(a[0] * _PER_STEP)
-    rest = subtract(a, _two_product(multiple, _STEP_1))
-    rest = subtract(rest, _two_product(multiple, _STEP_2))
-    rest = subtract(rest, _two_product(multiple, _STEP_3))
+    rest = subtract(a, two_product(multiple, _STEP_1))
+    rest = subtract(rest, two_product(multiple, _STEP_2))
+    rest = subtract(rest, two_product(multiple, _STEP_3))
     square = multiply(rest, rest)
     s = multiply(_polynomial(_SINE_SERIES, square), rest)
     c = _polynomial(_COSINE_SERIES, square)

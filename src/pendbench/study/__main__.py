@@ -28,13 +28,14 @@ class _Parser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The options of the command line."""
     options = _Parser(
+        allow_abbrev=False,
         prog="python -m pendbench.study",
         description="Run a study of physics engines against the analytic reference, and write its report.",
         epilog="Exit code: 0 the study ran, whatever the engines did; 1 --check found a regression; 2 bad input.",
     )
     options.add_argument("study", nargs="?", metavar="NAME-or-FILE", help="a bundled study, or a path to a .toml file")
     options.add_argument("--list", action="store_true", help="list the bundled studies and leave")
-    options.add_argument("--out", type=Path, metavar="DIR", help="folder for the report (default: results/NAME)")
+    options.add_argument("--out", metavar="DIR", help="folder for the report (default: results/NAME)")
     options.add_argument("--quick", action="store_true", help="the study's small variant: seconds instead of minutes")
     options.add_argument("--engines", metavar="A,B", help="only these of the study's engines")
     options.add_argument("--jobs", type=int, metavar="N", help="worker processes (default: one per processor)")
@@ -107,9 +108,11 @@ def _print(*lines: str) -> None:
 def _request(chosen: argparse.Namespace) -> Request:
     from pendbench.study.api import Request
 
+    if chosen.out == "":
+        raise InputError("--out is empty; allowed: a folder")
     return Request(
         study=chosen.study,
-        out=chosen.out,
+        out=None if chosen.out is None else Path(chosen.out),
         quick=chosen.quick,
         engines=_names(chosen.engines),
         jobs=chosen.jobs,

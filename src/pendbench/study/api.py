@@ -58,6 +58,8 @@ def processors() -> int:
 
 def _folder(request: Request, plan: Plan) -> Path:
     out = request.out if request.out is not None else Path("results") / plan.name
+    if out.is_file() or any(parent.is_file() for parent in out.parents):
+        raise InputError(f"--out {shown_path(out)}: is or lies below a file; allowed: a folder that can be written")
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

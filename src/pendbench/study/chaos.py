@@ -368,10 +368,11 @@ def _ending(runs: list[Record], refusal: str | None, truth: Mapping[str, Any]) -
     """How a case ended: as the worst of its starts did."""
     if refusal is not None:
         return {"status": "refused", "reason": refusal}
-    if "horizon" not in truth:
-        return {"status": "error", "reason": f"no truth to compare with: {truth.get('reason', '')}"}
     ranks = list(STATUSES)
     index = max(range(len(runs)), key=lambda i: ranks.index(runs[i]["status"]))
     worst = runs[index]
     where = f" (start {index} of {len(runs) - 1})" if index else ""
-    return {"status": worst["status"], "reason": f"{worst['reason']}{where}" if worst["reason"] else ""}
+    reason = f"{worst['reason']}{where}" if worst["reason"] else ""
+    if "horizon" not in truth:
+        reason = "; ".join(filter(None, [reason, f"not compared, for want of a truth: {truth.get('reason', '')}"]))
+    return {"status": worst["status"], "reason": reason}

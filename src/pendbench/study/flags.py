@@ -45,33 +45,19 @@ def of_row(
     """
     if another_system(causes):
         yield f"another system: accelerations differ by {causes['model_error']:.1e}"
-    if order_differs(causes):
-        yield f"order {causes['order_observed']:.1f} where {causes['order_claimed']} is claimed"
-    if math.isfinite(causes["plateau"]):
-        yield f"plateau: the error stops at {causes['plateau']:.1e}"
-    if good := _too_good(run):
+    yield from _of_steps(causes)
+    if good := _too_good(run, run.get("error_half"), run.get("reference_error_half")):
         yield f"too good: {good}"
-    if timing.get("step_spread", 0.0) > SPREAD_LIMIT:
-        yield f"noisy timing: spread {timing['step_spread']:.0%}"
     if "status" in model:
         yield f"model not compared: {model['status']}, {model['reason']}"
-    if "status" in timing:
-        yield f"not timed: {timing['status']}, {timing['reason']}"
+    yield from _of_timing(timing)
 
 
 def of_priced_row(run: Mapping[str, Any], order: Mapping[str, Any], timing: Mapping[str, Any]) -> Iterator[str]:
     """The flags of a row of a study of cost: of its run, of what the steps of its method showed, of its timing."""
-    error, known = run.get("error_max"), run.get("reference_error")
-    if order_differs(order):
-        yield f"order {order['order_observed']:.1f} where {order['order_claimed']} is claimed"
-    if math.isfinite(order["plateau"]):
-        yield f"plateau: the error stops at {order['plateau']:.1e}"
-    if error == 0.0:
-        yield "too good: no error at all"
-    elif error is not None and known is not None and error < 10 * known:
-        yield "too good: as near to the reference as that is known"
-    elif run.get("too_good"):
-        yield f"too good: {run['too_good']}"
+    yield from _of_steps(order)
+    if good := _too_good(run, run.get("error_max"), run.get("reference_error")):
+        yield f"too good: {good}"
     yield from _of_timing(timing)
 
 
@@ -82,11 +68,17 @@ def _of_timing(timing: Mapping[str, Any]) -> Iterator[str]:
         yield f"not timed: {timing['status']}, {timing['reason']}"
 
 
-def _too_good(run: Mapping[str, Any]) -> str:
+def _of_steps(shown: Mapping[str, Any]) -> Iterator[str]:
+    if order_differs(shown):
+        yield f"order {shown['order_observed']:.1f} where {shown['order_claimed']} is claimed"
+    if math.isfinite(shown["plateau"]):
+        yield f"plateau: the error stops at {shown['plateau']:.1e}"
+
+
+def _too_good(run: Mapping[str, Any], error: float | None, known: float | None) -> str:
     """No engine comes as near to the truth as that is known, in double precision, or stays on it to the last bit."""
     if run.get("error_max") == 0.0:
         return "no error at all"
-    half, known = run.get("error_half"), run.get("reference_error_half")
-    if half is not None and known is not None and half < 10 * known:
+    if error is not None and known is not None and error < 10 * known:
         return "as near to the reference as that is known"
     return str(run.get("too_good", ""))

@@ -39,7 +39,8 @@ def lyapunov_exponent(scene: Scene, seconds: float) -> Exponent:
     Two solutions start 1e-7 apart and are brought back to that distance at short intervals; the exponent is the mean
     rate at which they part (Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15, 1980). Distances mix angles and rates
     in units of sqrt(g / L). Regular motion parts linearly in time, which looks like a rate of ln(T) / T: a rate is
-    called chaotic above three times that.
+    called chaotic above three times that, and above three times its standard error. A single pendulum never is: its
+    energy leaves it no room, however unstable its upper equilibrium.
     """
     gravity = scene.effects.gravity or 1.0
     swing = math.sqrt(gravity / scene.total_length)
@@ -58,4 +59,5 @@ def lyapunov_exponent(scene: Scene, seconds: float) -> Exponent:
     rates = np.array([block.mean() for block in np.array_split(logs[-count:], _BLOCKS)]) / interval
     rate, error = float(rates.mean()), float(rates.std(ddof=1) / math.sqrt(_BLOCKS))
     total = count * interval
-    return Exponent(rate, error, rate > 3 * math.log(total * swing) / total)
+    chaotic = scene.n > 1 and rate > 3 * error and rate > 3 * math.log(total * swing) / total
+    return Exponent(rate, error, chaotic)

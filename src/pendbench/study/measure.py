@@ -107,7 +107,7 @@ def observed_order(dt: FloatArray, error: FloatArray, floor: float, ceiling: flo
     orders = {i: _order(h, e, i) for i in range(len(h) - 1) if e[i + 1] > floor and e[i] > 0}
     shown = {i: order for i, order in orders.items() if e[i] < ceiling and order >= _FLAT}
     if not shown:
-        flat = orders.get(len(h) - 2, math.inf) < _FLAT and e.min() > floor
+        flat = orders.get(len(h) - 2, math.inf) < _FLAT and floor < e.min() < ceiling
         return OrderFit(math.nan, float(h[-2]), float(h[-1]), float(e.min())) if flat else None
     last = max(i for i in shown if _confirmed(shown, i))
     order, start = shown[last], last + 1

@@ -18,19 +18,13 @@ from pendbench.engines.protocol import Method
 from pendbench.engines.registry import engine
 from pendbench.errors import InputError, choose, printable
 from pendbench.scene import Range, Scene, load_scene
-from pendbench.scene_file import Table
+from pendbench.scene_file import Table, one_line_title
 from pendbench.strict import input_error, read_toml, show, shown_path, validate
 from pendbench.study.case import Case
 from pendbench.study.kinds import KINDS, kind
 
 _STEP: Final = Range(1e-6, 1e3, "s")  # times are told apart to 1e-12 s
 _MOST_STEPS: Final = 1e12
-
-
-def _one_line(text: str) -> str:
-    if not (text.isprintable() and 1 <= len(text) <= 200):
-        raise ValueError("one line of 1 to 200 characters")
-    return text
 
 
 class EngineTable(Table):
@@ -52,7 +46,7 @@ class StudyFile(Table):
 
     KEYS_ARE: ClassVar[str] = "key"
 
-    title: Annotated[str, AfterValidator(_one_line)]
+    title: Annotated[str, AfterValidator(one_line_title)]
     kind: str = "chaos"
     scenes: Annotated[list[str], Field(min_length=1)]
     engines: Annotated[list[EngineTable], Field(min_length=1)]

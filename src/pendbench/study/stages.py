@@ -12,7 +12,7 @@ from pendbench.study.case import Case
 from pendbench.study.jobs import Job
 from pendbench.study.runner import Runner
 from pendbench.study.store import Store, key_of
-from pendbench.study.work import KERNELS, compile_kernel, measure_truth
+from pendbench.study.work import compile_kernel, measure_truth
 
 
 def job_of(function: Callable[..., Any], depends_on: tuple[object, ...], time_limit: float, *arguments: Any) -> Job:
@@ -22,8 +22,8 @@ def job_of(function: Callable[..., Any], depends_on: tuple[object, ...], time_li
 
 def compile_kernels(runner: Runner, cases: Sequence[Case], time_limit: float) -> None:
     """Compile what the cases and their truth need, once and side by side, before several jobs wait for the same."""
-    used = {case.method.replace("gauss6", "gauss4") for case in cases if case.engine == "analytic"}
-    names = [name for name in KERNELS if name in {"angle form", "vector form", "adaptive", *used}]
+    used = {case.method for case in cases if case.engine == "analytic"}
+    names = ["angle form", "adaptive", "vector form", *sorted(used - {"adaptive"})]
     jobs = [job_of(compile_kernel, (name,), time_limit, name, cases[0].scene) for name in names]
     runner.run("compiled kernels", jobs, lambda _, fault: fault_record(fault))
 
