@@ -58,9 +58,9 @@ def processors() -> int:
 
 def _folder(request: Request, plan: Plan) -> Path:
     out = request.out if request.out is not None else Path("results") / plan.name
-    if out.is_file() or any(parent.is_file() for parent in out.parents):
-        raise InputError(f"--out {shown_path(out)}: is or lies below a file; allowed: a folder that can be written")
     try:
+        if out.is_file() or any(parent.is_file() for parent in out.parents):
+            raise InputError(f"--out {shown_path(out)}: is or lies below a file; allowed: a folder that can be written")
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"--out {shown_path(out)}: {error.strerror}; allowed: a folder that can be written") from None
