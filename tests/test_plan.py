@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from pendbench.bundled import bundled
-from pendbench.errors import InputError
+from pendbench.errors import InputError, MissingEngineError
 from pendbench.strict import MAX_LINE
 from pendbench.study.plan import Plan, find_study, load_plan
 
@@ -400,3 +400,35 @@ def test_a_study_with_some_bytes_changed_is_a_plan_or_one_line(tmp_path, data):
         else:
             content[place:place] = content[place : place + data.draw(st.integers(1, 40))]
     plan_or_line(tmp_path / "any.toml", bytes(content))
+
+
+def test_an_optional_engine_that_is_not_installed_is_left_out_and_said(tmp_path, monkeypatch):
+    from pendbench.study import plan as module
+
+    found = module.engine
+
+    def without_mujoco(name):
+        if name == "mujoco":
+            raise MissingEngineError("engine 'mujoco' cannot be loaded")
+        return found(name)
+
+    monkeypatch.setattr(module, "engine", without_mujoco)
+    text = """
+title = "t"
+scenes = ["double"]
+[[engines]]
+name = "analytic"
+methods = ["adaptive"]
+[[engines]]
+name = "mujoco"
+methods = ["rk4"]
+dt = [1e-2]
+"""
+    study = tmp_path / "study.toml"
+    study.write_text(text + "optional = true\n")
+    plan = load_plan(study)
+    assert {case.engine for case in plan.cases} == {"analytic"}
+    assert plan.absent == ("mujoco",)
+    study.write_text(text)
+    with pytest.raises(InputError, match="mujoco"):
+        load_plan(study)

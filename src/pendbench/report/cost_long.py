@@ -13,6 +13,7 @@ from pendbench.report.text import markdown, table
 
 #: A slope that moves the energy by less than this share of its band is none.
 _NO_TREND: Final = 0.1
+_WIDE: Final = 0.01  # of the energy scale: who strays that far has kept little
 #: Bands of two stretches of one motion differ by up to this factor, and mean nothing by it.
 _ALIKE: Final = 2.0
 
@@ -75,4 +76,6 @@ def _band(row: Row, grows: float) -> str:
         return f"no trend, but a band that grows {number_text(grows, '.2g')}-fold"
     if grows < 1 / _ALIKE:
         return f"leaves its energy by {shown('energy_drift_max', row.get('energy_drift_max'))} early, and stays there"
+    if (band := number(row, "energy_drift_band")) > _WIDE:
+        return f"no trend, but a band of {number_text(band, '.1e')} of the energy scale"
     return "no drift"

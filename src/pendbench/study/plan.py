@@ -16,7 +16,7 @@ from pydantic import AfterValidator, ConfigDict, Field
 from pendbench.bundled import bundled, bundled_names
 from pendbench.engines.protocol import Method
 from pendbench.engines.registry import engine
-from pendbench.errors import InputError, choose, printable
+from pendbench.errors import InputError, MissingEngineError, choose, printable
 from pendbench.scene import Range, Scene, load_scene
 from pendbench.scene_file import Table, one_line_title
 from pendbench.strict import input_error, read_toml, show, shown_path, validate
@@ -30,7 +30,8 @@ _MOST_STEPS: Final = 1e12
 class EngineTable(Table):
     """[[engines]]: a name, some of its methods, steps, and lists of values for the methods' settings.
 
-    scenes: the names of those of the study's scenes that these are for; all of them by default.
+    scenes: the names of those of the study's scenes that these are for; all of them by default. optional: leave the
+    engine out where it is not installed, and say so.
     """
 
     model_config = ConfigDict(extra="allow")
@@ -39,6 +40,7 @@ class EngineTable(Table):
     methods: Annotated[list[str], Field(min_length=1)]
     dt: Annotated[list[Annotated[float, _STEP]], Field(min_length=1)] | None = None
     scenes: Annotated[list[str], Field(min_length=1)] | None = None
+    optional: bool = False
 
 
 class StudyFile(Table):
@@ -56,7 +58,10 @@ class StudyFile(Table):
 
 @dataclass(frozen=True)
 class Plan:
-    """A study, ready to run. options: the file's keys, checked, those of its kind among them."""
+    """A study, ready to run.
+
+    options: the file's keys, checked, those of its kind among them. absent: optional engines that are not installed.
+    """
 
     name: str
     where: str
@@ -64,6 +69,7 @@ class Plan:
     scenes: tuple[Scene, ...]
     cases: tuple[Case, ...]
     quick: bool
+    absent: tuple[str, ...] = ()
 
     @property
     def digest(self) -> str:
@@ -106,11 +112,13 @@ def load_plan(path_or_name: str | os.PathLike[str], *, quick: bool = False, engi
     if quick:
         where, options = f"{where} [quick]" if overlay else where, changed
     scenes = tuple(_scenes(where, options.scenes, path.parent))
-    cases = tuple(_cases(scenes, _selected(where, options.engines, engines)))
+    tables = _selected(where, options.engines, engines)
+    absent = sorted({table.name for _, table in tables if table.optional and not _installed(table.name)})
+    cases = tuple(_cases(scenes, [(at, table) for at, table in tables if table.name not in absent]))
     idle = {scene.name for scene in scenes} - {case.scene.name for case in cases}
     if idle and not engines:
         raise input_error(where, f"scenes has {min(idle)!r}, and no table of [[engines]] is for it")
-    plan = Plan(printable(path.stem), where, options, scenes, cases, quick)
+    plan = Plan(printable(path.stem), where, options, scenes, cases, quick, tuple(absent))
     its.check(plan)
     return plan
 
@@ -126,6 +134,14 @@ def _scenes(where: str, names: Sequence[str], folder: Path) -> Iterator[Scene]:
             raise input_error(where, f"scenes has {scene.name!r} twice; allowed: each name once")
         seen.add(scene.name)
         yield scene
+
+
+def _installed(name: str) -> bool:
+    try:
+        engine(name)
+    except MissingEngineError:
+        return False
+    return True
 
 
 def _selected(where: str, tables: list[EngineTable], only: Sequence[str]) -> list[tuple[str, EngineTable]]:
@@ -178,7 +194,9 @@ def _variants(where: str, table: EngineTable) -> Iterator[Variant]:
     known = sorted({setting for _, method in methods for setting in method.settings})
     for setting in settings:
         if setting not in known:
-            raise input_error(where, choose("key", printable(setting), ["name", "methods", "dt", "scenes", *known]))
+            raise input_error(
+                where, choose("key", printable(setting), ["name", "methods", "dt", "scenes", "optional", *known])
+            )
     if table.dt and all(method.adaptive for _, method in methods):
         raise input_error(where, f"dt is given; allowed: no dt, since method {methods[0][0]!r} chooses its steps")
     for name, method in methods:

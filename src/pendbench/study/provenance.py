@@ -32,6 +32,7 @@ def provenance(plan: Plan, workers: int) -> dict[str, Any]:
         "pendbench": __version__,
         "pendbench source": source_digest(),
         **{f"engine {name}": version(name) for name in names},
+        **{f"engine {name}": "not installed, left out" for name in plan.absent},
         **{name: metadata.version(name) for name in _LIBRARIES},
         "python": platform.python_version(),
         "operating system": platform.platform(),
