@@ -144,7 +144,7 @@ _ENERGY: Final = {
         "energy scale",
         ".1e",
         "energy drift",
-        "the largest deviation of the energy from its first value, over the whole run",
+        "the largest deviation of the energy from its first value at any sample of the whole run",
     ),
     "energy_drift_final": Column("energy scale", ".1e", "final drift", "the energy's deviation at the run's end"),
     "energy_drift_band": Column("energy scale", ".1e", "band", "the energy's largest value less its smallest one"),
