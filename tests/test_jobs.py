@@ -76,8 +76,8 @@ FAULTS = {
     "leaves": (does.leave, "error", "SystemExit: done"),
     "leaves at once": (does.leave_at_once, "crashed", "the process died with exit code 7"),
     "kills itself": (does.kill_itself, "crashed", "the process died of SIGKILL"),
-    "returns a lambda": (does.unpicklable, "error", "pickle"),
-    "returns a local class": (does.unpicklable_here, "error", "pickle"),
+    "returns a lambda": (does.unpicklable, "error", "locals"),
+    "returns a local class": (does.unpicklable_here, "error", "locals"),
 }
 
 
