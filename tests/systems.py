@@ -44,6 +44,14 @@ def _pull(system: Oscillator, t: float, q: np.ndarray, v: np.ndarray, a: np.ndar
 
 
 @compiled
+def _expand(system: Oscillator, t: float, q: np.ndarray, v: np.ndarray) -> None:  # noqa: ARG001
+    before = q
+    for k in range(len(v) - 1):
+        v[k + 1, 0] = -(system.frequency**2) * before[0] / (k + 1)
+        before = v[k] / (k + 1)
+
+
+@compiled
 def _oscillate_extended(system: Oscillator, y: np.ndarray, dy: np.ndarray) -> None:
     dy[0, 0], dy[0, 1] = y[1, 0], y[1, 1]
     dy[1, 0], dy[1, 1] = scale(scale((y[0, 0], y[0, 1]), -system.frequency), system.frequency)
@@ -56,6 +64,7 @@ def _grow(system: Growth, t: float, y: np.ndarray, dy: np.ndarray) -> None:
 
 specialise(problem.derivative, Oscillator, _oscillate)
 specialise(problem.acceleration, Oscillator, _pull)
+specialise(problem.rate_series, Oscillator, _expand)
 specialise(extrapolation.extended_derivative, Oscillator, _oscillate_extended)
 specialise(problem.derivative, Growth, _grow)
 

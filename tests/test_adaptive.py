@@ -11,7 +11,8 @@ import pytest
 from pendbench.physics.exact import single_pendulum
 from pendbench.physics.recursion import system_of
 from pendbench.scene import load_scene
-from pendbench.solvers.adaptive import DONE, FIRST_STEP, NOT_FINITE, REASONS, TOO_MANY, TOO_SMALL, integrate
+from pendbench.solvers.adaptive import FIRST_STEP, integrate
+from pendbench.solvers.outcome import DONE, NOT_FINITE, REASONS, TOO_MANY, TOO_SMALL
 from pendbench.solvers.tableaux import DOP853
 from pendbench.trajectory import STATUSES
 from scenes import chain

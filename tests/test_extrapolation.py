@@ -9,8 +9,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from pendbench.solvers.adaptive import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL
 from pendbench.solvers.extrapolation import integrate_extended, neville_weights
+from pendbench.solvers.outcome import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL
 from systems import Oscillator, order
 
 OSCILLATOR = Oscillator(frequency=1.5)

@@ -67,8 +67,8 @@ class _Solve:
 
     def advance(self, t: float, end: float) -> bool:
         """Advance from t to end; False where the solve cannot go on."""
-        from pendbench.solvers.adaptive import DONE, TOO_MANY, TOO_SMALL
         from pendbench.solvers.extrapolation import integrate_extended
+        from pendbench.solvers.outcome import DONE, TOO_MANY, TOO_SMALL
 
         usual = self.h
         while self.steps < _MOST_STEPS:

@@ -12,14 +12,22 @@ from pendbench.engines.protocol import Fault, State
 from pendbench.physics import canonical
 from pendbench.physics.geometry import positions, velocities
 from pendbench.physics.recursion import system_of
+from pendbench.physics.series import series_system_of
 from pendbench.scene import Scene
-from pendbench.solvers import adaptive, explicit, gauss, rattle, tableaux
+from pendbench.solvers import adaptive, explicit, gauss, outcome, rattle, tableaux, taylor
 
 
 def _finite(*arrays: FloatArray) -> Fault | None:
     if all(np.all(np.isfinite(array)) for array in arrays):
         return None
     return Fault("not finite", "an angle or a rate is not finite")
+
+
+def _given_up(how: int, t: float) -> Fault | None:
+    if how not in outcome.REASONS:
+        return None
+    status, reason = outcome.REASONS[how]
+    return Fault(status, f"{reason} at t = {t:.6g} s")
 
 
 class RungeKutta:
@@ -74,7 +82,7 @@ class Adaptive:
         # Angles are measured absolutely: a rod that has turned a thousand times is no less well known.
         self._relative = np.concatenate([np.zeros(scene.n), np.ones(scene.n)])
         self._settings, self._left = settings, int(settings["most_steps"])
-        self._h, self._outcome = adaptive.FIRST_STEP, adaptive.DONE
+        self._h, self._outcome = adaptive.FIRST_STEP, outcome.DONE
 
     def advance_to(self, time: float) -> int:
         """Advance to `time` and return how many steps that took."""
@@ -102,10 +110,48 @@ class Adaptive:
 
     def health(self) -> Fault | None:
         """Whether it is finite and within its limits."""
-        if self._outcome in adaptive.REASONS:
-            status, reason = adaptive.REASONS[self._outcome]
-            return Fault(status, f"{reason} at t = {self._t:.6g} s")
-        return _finite(self._y)
+        return _given_up(self._outcome, self._t) or _finite(self._y)
+
+
+class Taylor:
+    """Taylor's method, its order chosen for the tolerance."""
+
+    def __init__(self, scene: Scene, settings: Mapping[str, Any]) -> None:
+        order = taylor.order_for(settings["tolerance"])
+        self._system, self._t, self._h = series_system_of(scene, order), 0.0, taylor.NO_STEP
+        self._q, self._v, self._carry = scene.angles.copy(), np.zeros((order + 1, scene.n)), np.zeros((2, scene.n))
+        self._v[0] = scene.rates
+        self._state = State(scene.angles.copy(), scene.rates.copy())
+        self._settings, self._left, self._outcome = settings, int(settings["most_steps"]), outcome.DONE
+
+    def advance_to(self, time: float) -> int:
+        """Advance to `time` and return how many series that took."""
+        progress = taylor.integrate(
+            self._system,
+            self._t,
+            self._h,
+            time,
+            self._q,
+            self._v,
+            self._carry,
+            self._settings["tolerance"],
+            1.0,
+            self._settings["smallest_step"],
+            self._left,
+        )
+        taken: int = progress.accepted
+        self._t, self._h, self._outcome, self._left = progress.t, progress.h, progress.outcome, self._left - taken
+        reached = time - self._t if self._outcome == outcome.DONE else 0.0
+        taylor.state_at(reached, self._q, self._v, self._carry, *self._state[:2])
+        return taken
+
+    def state(self) -> State:
+        """The state now."""
+        return State(self._state.theta.copy(), self._state.omega.copy())
+
+    def health(self) -> Fault | None:
+        """Whether it is finite and within its limits."""
+        return _given_up(self._outcome, self._t) or _finite(self._state.theta, self._state.omega)
 
 
 class Gauss:

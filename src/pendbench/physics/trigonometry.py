@@ -55,7 +55,7 @@ def direction(angle: float) -> tuple[float, float]:
 
 
 @inlined
-def _bend(inner: float, outer: float) -> tuple[float, float]:
+def rounded_bend(inner: float, outer: float) -> tuple[float, float]:
     """The rounded outer - inner, and what rounding took from it."""
     bend = outer - inner
     kept = bend - outer
@@ -71,12 +71,12 @@ def write_bends(theta: FloatArray, out: FloatArray, cosine: int, sine: int) -> N
     """
     far = 0
     for i in range(len(theta) - 1):
-        bend, lost = _bend(theta[i], theta[i + 1])
+        bend, lost = rounded_bend(theta[i], theta[i + 1])
         out[cosine, i], out[sine, i] = cosine_sine(bend, lost)
         far += int(not abs(bend) <= FAR)  # a count, since a maximum would keep the loop from vectorising
     if far:
         for i in range(len(theta) - 1):
-            bend, lost = _bend(theta[i], theta[i + 1])
+            bend, lost = rounded_bend(theta[i], theta[i + 1])
             c, s = direction(bend)
             out[cosine, i], out[sine, i] = c - s * lost, s + c * lost
 

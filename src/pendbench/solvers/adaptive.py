@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
 from pendbench.solvers.explicit import stage_state
+from pendbench.solvers.outcome import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL, Progress
 from pendbench.solvers.problem import derivative
 from pendbench.solvers.tableaux import EmbeddedPair
-
-DONE, TOO_SMALL, TOO_MANY, NOT_FINITE = 0, 1, 2, 3
-
-#: What each outcome but DONE is called: a status of `trajectory.STATUSES`, and the reason.
-REASONS = {
-    TOO_SMALL: ("work limit", "the step fell below the smallest allowed"),
-    TOO_MANY: ("work limit", "more steps than allowed"),
-    NOT_FINITE: ("not finite", "the derivative is not finite"),
-}
 
 #: A first step to try, s. Error control shrinks it where it is too large.
 FIRST_STEP = 1e-3
@@ -28,16 +20,6 @@ FIRST_STEP = 1e-3
 _SAFETY = 0.9
 _GROW_AT_MOST = 5.0
 _SHRINK_AT_MOST = 0.2
-
-
-class Progress(NamedTuple):
-    """How an integration ended: DONE or why not, the time reached, the next step (s), steps accepted and rejected."""
-
-    outcome: int
-    t: float
-    h: float
-    accepted: int
-    rejected: int
 
 
 @compiled

@@ -14,9 +14,9 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
-from pendbench.solvers.adaptive import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL, Progress
 from pendbench.solvers.copying import copy_rows
 from pendbench.solvers.double_double import Number, add, divide, multiply, split, subtract
+from pendbench.solvers.outcome import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL, Progress
 
 
 def extended_derivative(system: Any, y: FloatArray, dy: FloatArray) -> None:

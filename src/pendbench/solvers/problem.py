@@ -34,3 +34,8 @@ def velocity(system: Any, q: FloatArray, p: FloatArray, v: FloatArray) -> None:
 def generalized_force(system: Any, t: float, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
     """Write dL/dq at time t (s), q (d,), v (d,) into f (d,)."""
     raise NotImplementedError(f"no generalized force for {type(system).__name__}")
+
+
+def rate_series(system: Any, t: float, q: FloatArray, v: FloatArray) -> None:
+    """From q (d,) and v[0] (d,) at time t (s), write the Taylor coefficients of the rates into v[1:] (order, d)."""
+    raise NotImplementedError(f"no series for {type(system).__name__}")

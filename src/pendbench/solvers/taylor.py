@@ -1,0 +1,138 @@
+"""Taylor's method: the series of the motion itself, as far as the accuracy asks for, and as long as it holds.
+
+There is no step to reject: the series says how far it holds before the step is taken. It holds at every moment on the
+way too, so a state between two steps costs nothing but its evaluation, and asking for one changes no step.
+
+Source: Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
+Experimental Mathematics 14 (2005), 99.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from pendbench.arrays import FloatArray
+from pendbench.compiled import compiled, inlined
+from pendbench.solvers.outcome import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL, Progress
+from pendbench.solvers.problem import rate_series
+
+#: A series' step before the series is known: none yet.
+NO_STEP = -1.0
+
+# The last orders that say how far a series holds. In a motion that time reversal or a reflection leaves as it is, three
+# of four orders in a row can be zero.
+_LAST_ORDERS = 4
+
+
+def order_for(tolerance: float) -> int:
+    """The order at which a step of this tolerance gets furthest for its work.
+
+    Measured on chains of 1 to 50 links, from 1e-2 to 1e-10: 0.9 orders for each digit and 4 more. The theory, which
+    counts the products and nothing else, has 1.15 for each digit and 1 more (Jorba and Zou, section 3).
+    """
+    return math.ceil(4.0 - 0.9 * math.log10(tolerance))
+
+
+@inlined
+def _reach(v: FloatArray, allowed: float, relative: float) -> float:
+    """How long (s) the series v (order + 1, d) holds; nan where it is not finite, inf where nothing moves.
+
+    allowed: log of the tolerance over the number of the first order left out.
+    """
+    order = len(v) - 1
+    most = -np.inf
+    for k in range(max(1, order - _LAST_ORDERS + 1), order + 1):
+        worst = 0.0
+        for i in range(v.shape[1]):
+            size = abs(v[k, i]) / (1.0 + relative * abs(v[0, i]))
+            worst = worst if size <= worst else size  # nan is kept
+        if not worst < np.inf:
+            return np.nan
+        most = max(most, math.log(worst) / k)
+    return math.exp(allowed - most)
+
+
+@inlined
+def _shares(orders: int) -> FloatArray:
+    shares = np.empty(orders)
+    for k in range(orders):
+        shares[k] = 1.0 / (k + 1)
+    return shares
+
+
+@inlined
+def _changes(v: FloatArray, i: int, h: float, shares: FloatArray) -> tuple[float, float]:
+    """What the series i adds to q and to v within h (s); shares are 1 / (k + 1), the factors of integration."""
+    q_change, v_change = 0.0, 0.0
+    for k in range(len(v) - 1, 0, -1):
+        q_change = q_change * h + v[k, i] * shares[k]
+        v_change = v_change * h + v[k, i]
+    return (q_change * h + v[0, i]) * h, v_change * h
+
+
+@inlined
+def _add(value: float, carry: float, change: float) -> tuple[float, float]:
+    """Value + change, and what rounding left out of it (compensated summation, Kahan 1965)."""
+    small = change + carry
+    total = value + small
+    return total, small - (total - value)
+
+
+@compiled
+def integrate(
+    system: Any,
+    t: float,
+    h: float,
+    end: float,
+    q: FloatArray,
+    v: FloatArray,
+    carry: FloatArray,
+    tolerance: float,
+    relative: float,
+    smallest: float,
+    most_steps: int,
+) -> Progress:
+    """Take steps until the series that begins at the time reached holds up to `end` (s).
+
+    t and h: where the last series began and how long it holds; h is `NO_STEP` before the first. q (d,) and v[0] (d,):
+    the state at t; v (order + 1, d): the series of the rates there; carry (2, d): what rounding left out of q and v[0].
+    All are changed in place. The local error allowed is `tolerance` in q and `tolerance (1 + relative |v|)` in v. Gives
+    up where a series holds for less than `smallest` (s) or than the rounding of t, after `most_steps` series, or at one
+    that is not finite. `state_at` gives the state at `end`.
+    """
+    shares = _shares(len(v))
+    allowed = math.log(tolerance) / len(v)
+    taken = 0
+    while True:
+        if h == NO_STEP:
+            if taken >= most_steps:
+                return Progress(TOO_MANY, t, h, taken, 0)
+            rate_series(system, t, q, v)
+            taken += 1
+            h = _reach(v, allowed, relative)
+        if not h >= 0.0:
+            return Progress(NOT_FINITE, t, h, taken, 0)
+        if t + h >= end:
+            return Progress(DONE, t, h, taken, 0)
+        if h < smallest or t + 0.1 * h == t:
+            return Progress(TOO_SMALL, t, h, taken, 0)
+        target = t + h
+        step = target - t  # what rounding makes of it, so that time does not slip
+        for i in range(len(q)):
+            q_change, v_change = _changes(v, i, step, shares)
+            q[i], carry[0, i] = _add(q[i], carry[0, i], q_change)
+            v[0, i], carry[1, i] = _add(v[0, i], carry[1, i], v_change)
+        t, h = target, NO_STEP
+
+
+@compiled
+def state_at(h: float, q: FloatArray, v: FloatArray, carry: FloatArray, q_then: FloatArray, v_then: FloatArray) -> None:
+    """Write the state h (s) after the series began into q_then (d,), v_then (d,)."""
+    shares = _shares(len(v))
+    for i in range(len(q)):
+        q_change, v_change = _changes(v, i, h, shares)
+        q_then[i] = q[i] + (q_change + carry[0, i])
+        v_then[i] = v[0, i] + (v_change + carry[1, i])
