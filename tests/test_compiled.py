@@ -38,9 +38,10 @@ print(q[0])
 """
 USE_CHAIN = """
 import numpy as np
-from pendbench.physics.recursion import System
+from pendbench.physics.recursion import system_of
+from pendbench.scene import Effects, Scene
 from pendbench.solvers.explicit import semi_implicit_euler
-chain = System(np.ones(1), np.ones(1), 1.0, np.empty((4, 1)))
+chain = system_of(Scene("one", "", 1.0, [1.0], [1.0], [0.0], [1.0], Effects(gravity=1.0)))
 q, v = np.array([0.0]), np.array([1.0])
 semi_implicit_euler(chain, 0.0, 0.5, q, v, 1)
 print(q[0])

@@ -186,3 +186,31 @@ def test_widest_range_that_a_scene_allows():
     )
     assert np.isfinite(at_start(accelerations, scene)).all()
     assert np.isfinite(at_start(tensions, scene)).all()
+
+
+def test_masses_that_leap_by_a_hundred_decades_keep_their_digits():
+    """Each leap multiplies the numbers of the elimination by 1e100: four are looked after before they overflow."""
+    rng = np.random.default_rng(12)
+    leaping = np.where(np.arange(20) % 2, 1e50, 1e-50)
+    scene = chain(20, mass=leaping, angle=rng.uniform(-3.0, 3.0, 20), rate=rng.uniform(-5.0, 5.0, 20))
+    assert relative_error(at_start(accelerations, scene), exact_accelerations(scene, digits=400)) < 1e-13
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.7, np.pi / 2])
+def test_chains_of_thousands_of_links_keep_their_rods(bend):
+    """Bent at right angles, each link doubles the numbers of the elimination, and a double holds 2^1024.
+
+    What is left over of (E19) for rods of fixed length is measured against the largest of its terms.
+    """
+    n = 5000
+    rng = np.random.default_rng(13)
+    scene = chain(
+        n, angle=np.cumsum(bend * rng.choice([-1.0, 1.0], n)), rate=rng.uniform(-1, 1, n), gravity=None, mass=2.0
+    )
+    pull = at_start(tensions, scene) / 2.0
+    cosine = np.cos(np.diff(scene.angles))
+    terms = [2.0 * pull, -np.append(0.0, cosine * pull[:-1]), -np.append(cosine * pull[1:], 0.0)]
+    terms[0][0] = pull[0]
+    left_over = sum(terms) - scene.lengths * scene.rates**2
+    assert np.abs(left_over).max() < 1e-13 * np.abs(pull).max()
+    assert np.abs(pull).max() > 0.1 * np.abs(scene.lengths * scene.rates**2).max()

@@ -15,8 +15,12 @@ from pendbench.solvers import problem
 from pendbench.solvers.copying import copy
 
 # The rows of a system's scratch. Outwards, each link's tension takes the place of the cosine it no longer needs.
-_OWN, _PASSED, _ACROSS, _COSINE = range(4)
+_OWN, _PASSED, _ACROSS, _COSINE, _WHOLE = range(5)
 _TENSION = _COSINE
+
+# The elimination's fractions are reduced where they have become large. A look at every fourth link will do: each link
+# multiplies them by 1 + the ratio of two masses, and four of these make 1e200 at most, since masses end at 1e50.
+_LOOK, _LARGE = 4, 1e20
 
 
 @inlined
@@ -27,25 +31,32 @@ def inwards(system: System, theta: FloatArray, omega: FloatArray) -> tuple[float
     `T_{i+1} = own_i + passed_i T_i`, and `across_i = sin / m_i`, with which T_{i+1} turns into the acceleration of mass
     i across rod i. Returns (alpha_1, beta_1), with which the tension in the first rod is `beta - alpha u.a'`.
     """
-    masses, lengths = system.masses, system.lengths
+    masses, lengths, ratios = system.masses, system.lengths, system.ratios
     scratch = system.scratch
     write_bends(theta, scratch, _COSINE, _ACROSS)
     tip = len(masses) - 1
+    # (E31): each link's division would have to wait for that of the link before it, so none is made until the end.
+    whole, loose, moving = 1.0, 1.0, lengths[tip] * omega[tip] ** 2
+    for last in range(tip, 0, -_LOOK):
+        for i in range(last - 1, max(last - _LOOK, 0) - 1, -1):
+            c, s = scratch[_COSINE, i], scratch[_ACROSS, i]
+            scratch[_OWN, i], scratch[_PASSED, i] = masses[i] * moving, c * whole
+            scratch[_ACROSS, i] = s * system.inverse_masses[i]
+            heavier = ratios[i] * loose
+            loose = heavier + s * s * whole
+            whole = whole + heavier
+            moving = c * moving + lengths[i] * omega[i] ** 2 * whole
+            scratch[_WHOLE, i] = whole
+        if whole > _LARGE:
+            share = 1.0 / whole
+            whole, loose, moving = 1.0, loose * share, moving * share
+    for i in range(tip):
+        share = 1.0 / scratch[_WHOLE, i]
+        scratch[_OWN, i] *= share
+        scratch[_PASSED, i] *= share
     scratch[_OWN, tip], scratch[_PASSED, tip], scratch[_ACROSS, tip] = 0.0, 0.0, 0.0
-    alpha = masses[tip]
-    beta = alpha * lengths[tip] * omega[tip] ** 2
-    for i in range(tip - 1, -1, -1):
-        m = masses[i]
-        c, s = scratch[_COSINE, i], scratch[_ACROSS, i]
-        loose = 1.0 / (m + alpha)
-        held = m / (m + alpha * s * s)
-        scratch[_OWN, i] = m * beta * loose
-        scratch[_PASSED, i] = alpha * c * loose
-        scratch[_ACROSS, i] = s / m
-        beta *= c * held
-        alpha = held * (m + alpha)
-        beta += alpha * lengths[i] * omega[i] ** 2
-    return alpha, beta
+    jerked = masses[0] / loose
+    return jerked * whole, jerked * moving
 
 
 @inlined
@@ -96,8 +107,10 @@ def system_of(scene: Scene) -> System:
     return System(
         masses=np.array(scene.masses),
         lengths=np.array(scene.lengths),
+        inverse_masses=1.0 / scene.masses,
+        ratios=scene.masses[:-1] / scene.masses[1:],
         gravity=0.0 if gravity is None else float(gravity),
-        scratch=np.empty((4, scene.n)),
+        scratch=np.empty((5, scene.n)),
     )
 
 

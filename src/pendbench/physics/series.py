@@ -1,4 +1,4 @@
-"""The chain's motion as a Taylor series in time, in O(n) for each order (docs/equations.md, (E31) to (E34)).
+"""The chain's motion as a Taylor series in time, in O(n) for each order (docs/equations.md, (E32) to (E35)).
 
 All series are built together, order by order: the term of order k of a product of two series is a convolution of the
 lower orders with, at its ends, the two terms of order k itself.
@@ -160,7 +160,7 @@ def _outwards(s: SeriesSystem, k: int, pull: float, start: float, omega: FloatAr
 def write_rate_series(s: SeriesSystem, t: float, theta: FloatArray, omega: FloatArray) -> None:  # noqa: ARG001
     """From theta (n,) and omega[0] (n,), write the Taylor coefficients omega[1:] (order, n), rad/s^(k + 1).
 
-    Source: docs/equations.md, (E31) to (E34).
+    Source: docs/equations.md, (E32) to (E35).
     """
     near = _begin(s, theta, omega)
     end_left, end_right = s.end_left[0], s.end_right[0]

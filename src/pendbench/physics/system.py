@@ -13,11 +13,14 @@ from pendbench.arrays import FloatArray
 class System(NamedTuple):
     """A chain under gravity or free of it.
 
-    masses (n,) kg; lengths (n,) m; gravity m/s^2 (0 where the scene has none: it enters once, at the pivot, and costs
-    the same); scratch (4, n): room for the recursion, so that a call allocates nothing. One thread, one system.
+    masses (n,) kg; lengths (n,) m; ratios (n - 1,) of each mass to the next; gravity m/s^2 (0 where the scene has none:
+    it enters once, at the pivot, and costs the same); scratch (5, n): room for the recursion, so that a call allocates
+    nothing. One thread, one system.
     """
 
     masses: FloatArray
     lengths: FloatArray
+    inverse_masses: FloatArray
+    ratios: FloatArray
     gravity: float
     scratch: FloatArray
