@@ -31,7 +31,7 @@ ONLY = {
     "solvers": {"arrays", "compiled"},
     "physics": {"arrays", "compiled", "errors", "scene", "solvers"},
     # Rows, and pure functions of arrays.
-    "report": {"errors", "files", "strict", "trajectory", "study.results", "study.measure"},
+    "report": {"errors", "files", "strict", "trajectory", "study.results", "study.measure", "study.verdict"},
     # An adapter translates.
     "engines.mujoco": {"arrays", "engines.mjcf", "engines.protocol", "scene", "trajectory"},
     "engines.pymunk": {"arrays", "engines.protocol", "scene", "trajectory"},
@@ -48,6 +48,7 @@ ONLY = {
     # Errors and times are taken in separate runs, by modules that do not meet.
     "study.clock": {"arrays", "engines.protocol", "scene"},
     "study.measure": {"arrays"},
+    "study.verdict": {"arrays"},
     "study.results": set(),
 }
 #: Libraries that only these may import.

@@ -40,14 +40,15 @@ class Setting:
 class Method:
     """One way an engine advances time.
 
-    order: the order of convergence it claims. adaptive: it chooses its own steps and is built with dt None.
-    note: one line for the documentation.
+    order: the order of convergence it claims. adaptive: it chooses its own steps and is built with dt None. dense: its
+    steps give every state on the way, so several times can fall into one. note: one line for the documentation.
     """
 
     order: int
     adaptive: bool = False
     settings: Mapping[str, Setting] = field(default_factory=dict)
     note: str = ""
+    dense: bool = False
 
     def with_defaults(self, given: Mapping[str, float]) -> dict[str, float]:
         """The settings `given`, and the defaults of those that are not; one without either is left out."""

@@ -208,6 +208,45 @@ _CAUSES: Final = {
     "cause": _text("cause", "what makes this method leave the truth"),
 }
 
+_STABILITY: Final = {
+    "title": _text("title", "what the scene is, in its own words"),
+    "verdict": _text("verdict", "whether the run was stable"),
+    "best_verdict": _text("best verdict", "the verdict with the best step of all that were tried"),
+    "broke_s": Column("s", ".3g", "broke at, s", "when the energy was first astray by more than its scale"),
+    "stays_s": Column(
+        "s",
+        ".3g",
+        "stays for, s",
+        "for a chain released at rest where nothing pulls it: when it had first moved by 0.1 rad, or how long it was "
+        "run where it never had",
+    ),
+    "stable_dt": Column(
+        "s", ".2g", "largest stable step, s", "the largest step that holds, of those tried: known to a tenth"
+    ),
+    "stable_dt_ratio": Column(
+        "1", ".2g", "of the best", "the largest stable step over that of the scene's best method"
+    ),
+    "stable_dt_stiffest": Column(
+        "rad",
+        ".2g",
+        "step times frequency",
+        "the largest stable step times stiffest_rad_per_s: near a method's stability limit (2.8 for RK4, 2 for "
+        "semi-implicit Euler and RATTLE) where stiffness is what limits the step",
+    ),
+    "stable_dt_exponent": Column(
+        "1", ".2f", "exponent", "p in: largest stable step ~ n^p, by least squares over scenes that differ in n alone"
+    ),
+    "n_from": Column("1", "d", "from n", "the fewest links of these scenes whose largest stable step is known"),
+    "n_to": Column("1", "d", "to n", "the most links of these scenes whose largest stable step is known"),
+    "scenes_held": Column("1", "d", "scenes held", "of these scenes, those that some step holds"),
+    "scenes": Column("1", "d", "scenes", "how many scenes these are"),
+    "adaptive": _text("adaptive", "whether the method chooses its own steps"),
+    "stiffest_rad_per_s": Column(
+        "rad/s", ".3g", "stiffest, rad/s", "the fastest small oscillation about the hanging chain"
+    ),
+    "fastest_rad_per_s": Column("rad/s", ".3g", "fastest at the start, rad/s", "the largest angular rate at the start"),
+}
+
 _COSTS: Final = {
     "steps": Column("1", "d", "steps", "steps that the run took"),
     "step_us": Column("us", ".3g", "step, µs", "the median cost of a step", is_time=True),
@@ -254,6 +293,7 @@ COLUMNS: Final = MappingProxyType(
         **_threshold("1e-1"),
         **_ENERGY,
         **_CAUSES,
+        **_STABILITY,
         **_COSTS,
     }
 )

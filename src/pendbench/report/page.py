@@ -11,7 +11,11 @@ if TYPE_CHECKING:
     from pendbench.study.results import Results
 
 #: Kinds of study, each with the module of its page. The others have the plain one.
-PAGES: Final = {"chaos": "pendbench.report.chaos", "cost": "pendbench.report.cost"}
+PAGES: Final = {
+    "chaos": "pendbench.report.chaos",
+    "cost": "pendbench.report.cost",
+    "stability": "pendbench.report.stability",
+}
 
 _PLAIN: Final = "pendbench.report.plain"
 

@@ -1,8 +1,8 @@
 """What a study found before, and whether it finds worse now. Times are never part of it.
 
-A baseline is a CSV file beside the study: for each case its status, its error and its energy drift, and the order that
-its method shows. Where a study compares up to the horizon, that is up to half of it: later, chaos makes numbers of
-rounding.
+A baseline is a CSV file beside the study: for each case its status, its verdict, its error and its energy drift, and
+for its method the order that it shows and the largest step with which it is stable. Where a study compares up to the
+horizon, that is up to half of it: later, chaos makes numbers of rounding.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import pandas as pd
 from pendbench.errors import choose, describe, printable
 from pendbench.files import write_whole
 from pendbench.strict import input_error, shown_path
+from pendbench.study.verdict import VERDICTS, rank
 from pendbench.trajectory import STATUSES
 
 _KEYS: Final = ("scene", "engine", "method", "dt", "settings")
@@ -32,6 +33,10 @@ _FLOORS: Final = {
 _INSTEAD: Final = {"error_max": "error_half", "energy_drift_max": "energy_drift_half"}
 #: What is as bad where it falls as where it grows, and by how much it may differ. It is of all the steps of a method.
 _STAYS: Final = {"order_observed": 0.2}
+#: What may grow but not shrink: to this share of what it was. It is of all the steps of a method.
+_SHRINKS: Final = {"stable_dt": 0.8}
+#: Words that are better or worse.
+_WORDS: Final = ("verdict",)
 #: How much larger a number may be than it was. Other processors and libraries round otherwise; half as much again is
 #: no rounding.
 _BAND: Final = 1.5
@@ -45,7 +50,8 @@ def baseline_path(study: Path, *, quick: bool) -> Path:
 def write_baseline(path: Path, cases: pd.DataFrame) -> None:
     """Keep what the cases show as the baseline."""
     numbers = [name for name in _FLOORS if name in cases and _INSTEAD.get(name) not in cases]
-    columns = [*_KEYS, "status", *numbers, *(name for name in _STAYS if name in cases)]
+    words = [name for name in _WORDS if name in cases]
+    columns = [*_KEYS, "status", *words, *numbers, *(name for name in (*_STAYS, *_SHRINKS) if name in cases)]
     text = cases[columns].to_csv(index=False, float_format="%.6g", lineterminator="\n")
     write_whole(path, lambda file: file.write(text.encode()))
 
@@ -68,12 +74,15 @@ def _read(path: Path) -> pd.DataFrame:
     for name in (*_KEYS, "status"):
         if name not in table:
             raise ValueError(f"column {name!r} is missing")
-    for name in ("dt", *_FLOORS, *_STAYS):
+    for name in ("dt", *_FLOORS, *_STAYS, *_SHRINKS):
         if name in table:
             table[name] = pd.to_numeric(table[name].where(table[name] != ""))
     for status in table["status"]:
         if status not in STATUSES:
             raise ValueError(choose("status", printable(str(status)), STATUSES))
+    for verdict in table.get("verdict", ()):
+        if verdict not in VERDICTS:
+            raise ValueError(choose("verdict", printable(str(verdict)), VERDICTS))
     return table
 
 
@@ -110,6 +119,8 @@ def regressions(cases: pd.DataFrame, baseline: pd.DataFrame) -> list[str]:
 
 def _worse(before: pd.Series, now: pd.Series) -> list[str]:
     name, ranks = _name(before), list(STATUSES)
+    if "verdict" in before and "verdict" in now and rank(now["verdict"]) > rank(before["verdict"]):
+        return [f"{name}: verdict was '{before['verdict']}', is '{now['verdict']}' ({now['reason']})"]
     if ranks.index(now["status"]) > ranks.index(before["status"]):
         return [f"{name}: status was '{before['status']}', is '{now['status']}' ({now['reason']})"]
     found = []
@@ -120,7 +131,7 @@ def _worse(before: pd.Series, now: pd.Series) -> list[str]:
         value = float(now[column])
         if not value <= allowed:
             found.append(f"{name}: {column} was {before[column]:.3g}, is {value:.3g}; allowed up to {allowed:.3g}")
-    return found + _moved(before, now)
+    return found + _moved(before, now) + _shrunk(before, now)
 
 
 def _moved(before: pd.Series, now: pd.Series) -> list[str]:
@@ -133,4 +144,16 @@ def _moved(before: pd.Series, now: pd.Series) -> list[str]:
         if not abs(value - was) <= most:
             low, high = was - most, was + most
             found.append(f"{name}: {column} was {was:.3g}, is {value:.3g}; allowed from {low:.3g} to {high:.3g}")
+    return found
+
+
+def _shrunk(before: pd.Series, now: pd.Series) -> list[str]:
+    """What should not have become smaller; one line for all the steps of a method."""
+    found, name = [], _name(before, with_step=False)
+    for column, share in _SHRINKS.items():
+        if column not in before or column not in now or pd.isna(before[column]):
+            continue
+        was, value = float(before[column]), float(now[column])
+        if not value >= share * was:
+            found.append(f"{name}: {column} was {was:.3g}, is {value:.3g}; allowed from {share * was:.3g}")
     return found

@@ -12,7 +12,11 @@ if TYPE_CHECKING:
     from pendbench.study.runner import Runner
 
 #: Names of kinds, each with its module.
-KINDS: Final = {"chaos": "pendbench.study.chaos", "cost": "pendbench.study.cost"}
+KINDS: Final = {
+    "chaos": "pendbench.study.chaos",
+    "cost": "pendbench.study.cost",
+    "stability": "pendbench.study.stability",
+}
 
 
 class Kind(Protocol):

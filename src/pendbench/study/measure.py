@@ -169,3 +169,10 @@ def price_of_digit(error: FloatArray, run_s: FloatArray, floor: float, ceiling: 
         return math.nan
     slope = float(np.polyfit(-np.log10(error[usable]), np.log10(run_s[usable]), 1)[0])
     return 10.0**slope if slope > 0 else math.nan
+
+
+def growth_exponent(n: FloatArray, value: FloatArray) -> float:
+    """The exponent p of `value ~ n^p` by least squares on logarithms, (k,) each; nan for fewer than three points."""
+    if len(n) < 3:
+        return math.nan
+    return float(np.polyfit(np.log(n), np.log(value), 1)[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from pendbench.engines.protocol import Fault
 from pendbench.engines.registry import engine
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance, wrapped
+from pendbench.physics.recursion import accelerations
 from pendbench.recording import simulate
 from pendbench.scene import Scene
 from pendbench.study.case import Case
@@ -20,6 +22,7 @@ from pendbench.study.clock import Timing, time_case, time_each_step
 from pendbench.study.lyapunov import lyapunov_exponent
 from pendbench.study.measure import drift, growth_rate, time_to
 from pendbench.study.store import Store
+from pendbench.study.verdict import verdict_of
 from pendbench.trajectory import Trajectory
 from pendbench.truth import Truth, reference, solve_angles, solve_vectors
 
@@ -31,6 +34,8 @@ THRESHOLDS: Final = (1e-3, 1e-2, 1e-1)
 _CURVE_POINTS: Final = 250
 _LONG_SAMPLES: Final = 20_000
 _APART: Final = 1e-10
+_MOVED: Final = 0.1  # rad: no longer where it was
+_PULLED: Final = 1e-5  # rad/s^2: more than what an equilibrium has by rounding, or by a nudge of 1e-9 rad
 _GROWTH_FROM: Final = 1e-12
 _GROWTH_TO: Final = 1e-2
 #: So many samples that are all the truth to the last bit tell something; the first few of a good method are, too.
@@ -135,7 +140,7 @@ def measure_run(
     upto = _largest(error[half[: len(error)]])
     record |= {
         "error_max": _largest(error),
-        "too_good": _too_good(run, truth, at),
+        "too_good": _too_good(case, run, truth, at),
         "error_half": upto,
         "reference_error_half": _largest(truth["disagreement"][at[half]]),
         "angle_error_max_rad": _largest(angle),
@@ -170,7 +175,7 @@ def measure_error(case: Case, times: FloatArray, truth_key: str, store: Store) -
         "reference_error": _largest(truth["disagreement"][at]),
         "energy_drift_max": _energies(case.scene, run, float(times[-1]))["energy_drift_max"],
         "gap_max": _largest(run.gap),
-        "too_good": _too_good(run, truth, at),
+        "too_good": _too_good(case, run, truth, at),
     }
 
 
@@ -198,6 +203,40 @@ def measure_long_run(case: Case, steps: int) -> Record:
     }
 
 
+def measure_stability(case: Case, duration: float) -> Record:
+    """Run the case for `duration` (s) and judge it."""
+    scene = replace(case.scene, duration=duration)
+    run = simulate(scene, case.engine, case.method, case.dt, **dict(case.settings))
+    with np.errstate(over="ignore", invalid="ignore"):
+        values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
+        strays = (values - values[:1]) / scale if scale else values - values[:1]
+    found = verdict_of(run.status, run.reason, run.t, strays, run.gap)
+    return {
+        "status": run.status,
+        "reason": found.reason,
+        "verdict": found.word,
+        "broke_s": found.broke,
+        "stays_s": _stays(scene, run),
+        "energy_drift_max": _largest(np.abs(strays)),
+        "gap_max": _largest(run.gap),
+        "steps": run.steps,
+    }
+
+
+def _stays(scene: Scene, run: Trajectory) -> float | None:
+    """When a chain released at rest, where nothing pulls it, had moved by `_MOVED`; its end where it never had."""
+    pulled = np.abs(accelerations(scene, scene.angles, scene.rates)).max() > _PULLED
+    if scene.rates.any() or pulled or not len(run.t):
+        return None
+    moved = np.flatnonzero(np.abs(run.theta - scene.angles).max(axis=1) > _MOVED)
+    return float(run.t[moved[0]] if moved.size else run.t[-1])
+
+
+def failed_stability(fault: Fault) -> Record:
+    """The record of a run of which nothing came back."""
+    return {"status": fault.status, "reason": fault.reason, "verdict": fault.status}
+
+
 def failed_run(fault: Fault) -> Record:
     """The record of a run of which nothing came back."""
     return {"status": fault.status, "reason": fault.reason, "order_error": None}
@@ -211,16 +250,20 @@ def _errors(scene: Scene, run: Trajectory, truth: dict[str, FloatArray], at: Any
     return distance(scene.lengths, truth["theta"][at], offset), angle
 
 
-def _too_good(run: Trajectory, truth: dict[str, FloatArray], at: Any) -> str:
+def _too_good(case: Case, run: Trajectory, truth: dict[str, FloatArray], at: Any) -> str:
     """What no honest run can do, in words: take no steps, or stay on the truth to the last bit; empty for most runs."""
     at = at[: len(run.t)]
-    if run.steps is not None and run.steps < np.count_nonzero(run.t):
+    if run.steps is not None and run.steps < (1 if _is_dense(case) else np.count_nonzero(run.t)):
         return f"{run.steps} steps to {np.count_nonzero(run.t)} different times"
     same = truth["t"][at] == run.t[: len(at)]  # the others are a rounding apart, and so are their angles
     at = at[same]
     offset = (run.theta[: len(same)][same] - truth["theta"][at]) - truth["theta_low"][at]
     rounding = 0.5 * np.spacing(np.abs(truth["theta"][at]))
     return "the truth, to the last bit" if len(at) >= _TELLING and np.all(np.abs(offset) <= rounding) else ""
+
+
+def _is_dense(case: Case) -> bool:
+    return engine(case.engine).methods[case.method].dense
 
 
 def _divergence(t: FloatArray, error: FloatArray) -> Record:
