@@ -188,3 +188,32 @@ def test_pendulum_for_two_thousand_seconds():
     times = np.linspace(0.0, 2000.0, 401)
     run = pb.simulate(scene, engine="analytic", method="taylor", times=times)
     assert np.abs(run.theta - single_pendulum(scene, times)[0]).max() < 2e-9
+
+
+def error_of(scene, until, tolerance):
+    """The worst angle of `taylor` at a time, rad, over the worst of DOP853's at the same tolerance or that tolerance."""
+    truth = pb.reference(scene, [until])
+    found = {}
+    for method in ("taylor", "adaptive"):
+        run = pb.simulate(scene, engine="analytic", method=method, times=[until], tolerance=tolerance)
+        found[method] = np.abs(truth.offset(run.theta)).max()
+    return found["taylor"] / max(found["adaptive"], tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-8])
+def test_motion_in_slow_units_is_no_less_accurate(tolerance):
+    """Rates far below 1 rad/s: what a step adds to the angles limits it, not what it adds to the rates."""
+    free = chain(2, angle=[0.0, 1.5], rate=[1e-3, -1e-3], gravity=None, duration=1e4)
+    assert error_of(free, 3000.0, tolerance) < 100.0
+    long = chain(1, angle=1.0, length=1e4, duration=1e4)
+    assert error_of(long, 1000.0, tolerance) < 100.0
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_series_whose_terms_still_grow_is_cut(tolerance):
+    """A nanoradian from the top the last terms are tiny, and those left out are not."""
+    scene = chain(1, angle=np.pi - 1e-9, length=1.0, duration=10.0)
+    run = pendulum(scene, order_for(tolerance), tolerance)
+    run.to(0.0)
+    truth = pb.reference(scene, [run.h])
+    assert np.abs(truth.offset(run.state(run.h)[None, :1])).max() < tolerance

@@ -47,7 +47,9 @@ def _who(prices: Prices, winners: _Winners) -> str:
     if len(prices.engines) == 1:
         return f"The only engine that took part is {first}."
     if len(wins) == 1:
-        span = _span([accuracy for accuracy in prices.accuracies if any(at == accuracy for _, at in winners)])
+        if len(winners) < len(prices.scenes) * len(prices.accuracies):
+            return f"Where an error is reached at all, the cheapest engine is {first}: {_wins(first, prices, winners)}."
+        span = _span(prices.accuracies)
         every = "every accuracy from " if " to " in span else ""
         return f"The cheapest engine is {first}: at {every}{span}, in {_places(prices.scenes, prices.scenes)}."
     others = [f"{engine} {_wins(engine, prices, winners)}" for engine in wins if engine != first]
@@ -105,6 +107,9 @@ def _compared(engine: str, leader: str, best: Mapping[tuple[str, str], Row], sce
     of_what = f"geometric mean of {len(ratios)} scenes, {low} to {high}"
     if low == high:
         of_what = "in one scene" if len(ratios) == 1 else f"in each of {len(ratios)} scenes"
+    bounds = sum(str(best[scene, engine].get("bound")).lower() == "true" for scene in scenes if (scene, engine) in best)
+    if bounds:
+        of_what += f"; in {bounds} of them its coarsest run is more accurate than that, so a coarser one might do"
     return f"the best of {engine} takes {number_text(mean, '.2g')} times as long ({of_what})"
 
 

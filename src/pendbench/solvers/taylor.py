@@ -40,19 +40,29 @@ def order_for(tolerance: float) -> int:
 def _reach(v: FloatArray, allowed: float, relative: float) -> float:
     """How long (s) the series v (order + 1, d) holds; nan where it is not finite, inf where nothing moves.
 
-    allowed: log of the tolerance over the number of the first order left out.
+    allowed: log of the tolerance over the number of the first order left out. Each of the last orders limits the step
+    by what it adds to q and by what it adds to v. And terms have to fall: close to an equilibrium the last ones can be
+    as small as you like while those that are left out are larger.
     """
     order = len(v) - 1
-    most = -np.inf
+    most, late = -np.inf, 0.0
     for k in range(max(1, order - _LAST_ORDERS + 1), order + 1):
-        worst = 0.0
+        worst_q, worst_v = 0.0, 0.0
         for i in range(v.shape[1]):
-            size = abs(v[k, i]) / (1.0 + relative * abs(v[0, i]))
-            worst = worst if size <= worst else size  # nan is kept
-        if not worst < np.inf:
+            size = abs(v[k, i])
+            scaled = size / (1.0 + relative * abs(v[0, i]))
+            worst_v = worst_v if scaled <= worst_v else scaled  # nan is kept
+            worst_q = worst_q if size <= worst_q else size
+        if not worst_v < np.inf:
             return np.nan
-        most = max(most, math.log(worst) / k)
-    return math.exp(allowed - most)
+        most = max(most, math.log(worst_v) / k, math.log(worst_q / (k + 1)) / (k + 1))
+        late += worst_q
+    early = 0.0
+    for k in range(max(0, order - 2 * _LAST_ORDERS + 1), order - _LAST_ORDERS + 1):
+        for i in range(v.shape[1]):
+            early = max(early, abs(v[k, i]))
+    reach = math.exp(allowed - most)
+    return min(reach, 0.5 * math.sqrt(math.sqrt(early / late))) if early > 0.0 and late > 0.0 else reach
 
 
 @inlined

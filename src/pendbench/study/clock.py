@@ -71,22 +71,31 @@ def _steps_of_sample(simulation: Simulation, most: int) -> int:
 
 
 def _adaptive(engine: Engine, scene: Scene, method: str, settings: dict[str, float], until: float) -> Timing:
-    samples, builds, firsts, steps = [], [], [], 1
-    for _ in range(REPEATS + 1):
+    """Samples of whole runs, from the start and without a stop: several in one sample, where they are short."""
+    builds: list[float] = []
+
+    def build() -> AdaptiveSimulation:
         begun = time.perf_counter()
         simulation = engine.build(scene, method, None, **settings)
         builds.append(time.perf_counter() - begun)
         assert isinstance(simulation, AdaptiveSimulation)
-        begun = time.perf_counter()
-        simulation.advance_to(1e-6 * until)
-        firsts.append(time.perf_counter() - begun)
-        begun = time.perf_counter()
-        steps = max(1, simulation.advance_to(until))
-        samples.append(time.perf_counter() - begun)
-    samples = samples[1:]
+        return simulation
+
+    first = build()
+    first_call = _seconds(lambda: first.advance_to(1e-6 * until))
+    samples, steps = [], 1
+    for _ in range(REPEATS):
+        spent, runs = 0.0, 0
+        while spent < _SAMPLE_S and runs < _MOST_RUNS:
+            simulation = build()
+            begun = time.perf_counter()
+            steps = max(1, simulation.advance_to(until))
+            spent += time.perf_counter() - begun
+            runs += 1
+        samples.append(spent / runs)
     median = float(np.median(samples))
     spread = float(np.ptp(samples)) / median
-    return Timing(median / steps * 1e6, spread, steps, float(np.median(builds)), firsts[0], median)
+    return Timing(median / steps * 1e6, spread, steps, float(np.median(builds)), first_call, median)
 
 
 def _seconds(call: Callable[[], object]) -> float:
