@@ -20,6 +20,7 @@ FLOORS = (
     ("solvers",),
     ("physics",),
     ("truth",),
+    ("ensemble",),
     ("engines",),
     ("recording",),
     ("study",),

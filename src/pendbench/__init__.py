@@ -11,6 +11,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from pendbench.engines.conformance import check_engine
+    from pendbench.ensemble import Ensemble, first_flips, simulate_ensemble
     from pendbench.errors import InputError
     from pendbench.physics.energy import energy
     from pendbench.recording import simulate
@@ -20,27 +21,33 @@ if TYPE_CHECKING:
     from pendbench.truth import reference
 
 _HOMES = {
+    "Ensemble": "pendbench.ensemble",
     "InputError": "pendbench.errors",
     "Scene": "pendbench.scene",
     "Trajectory": "pendbench.trajectory",
     "check_engine": "pendbench.engines.conformance",
     "energy": "pendbench.physics.energy",
+    "first_flips": "pendbench.ensemble",
     "load_scene": "pendbench.scene",
     "reference": "pendbench.truth",
     "run_study": "pendbench.study.api",
     "simulate": "pendbench.recording",
+    "simulate_ensemble": "pendbench.ensemble",
 }
 
 __all__ = [
+    "Ensemble",
     "InputError",
     "Scene",
     "Trajectory",
     "check_engine",
     "energy",
+    "first_flips",
     "load_scene",
     "reference",
     "run_study",
     "simulate",
+    "simulate_ensemble",
 ]
 
 

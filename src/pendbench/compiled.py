@@ -81,6 +81,11 @@ def compiled(function: Kernel) -> Kernel:
     return _compiled(function, _OPTIONS)
 
 
+def compiled_for_threads(function: Kernel) -> Kernel:
+    """The same for a kernel beside which other threads of Python run."""
+    return _compiled(function, {**_OPTIONS, "nogil": True})
+
+
 def inlined(function: Kernel) -> Kernel:
     """The same for a small kernel that is made part of whatever calls it: passing arrays costs as much as it does."""
     return _compiled(function, _INLINED)

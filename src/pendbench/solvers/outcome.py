@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 DONE, TOO_SMALL, TOO_MANY, NOT_FINITE = 0, 1, 2, 3
+#: Not a way to give up: the run was to end where its state passes a limit.
+CROSSED = 4
 
 #: What each outcome but DONE is called: a status of `trajectory.STATUSES`, and the reason.
 REASONS = {

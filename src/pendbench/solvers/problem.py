@@ -39,3 +39,8 @@ def generalized_force(system: Any, t: float, q: FloatArray, v: FloatArray, f: Fl
 def rate_series(system: Any, t: float, q: FloatArray, v: FloatArray) -> None:
     """From q (d,) and v[0] (d,) at time t (s), write the Taylor coefficients of the rates into v[1:] (order, d)."""
     raise NotImplementedError(f"no series for {type(system).__name__}")
+
+
+def derivatives_of_many(system: Any, y: FloatArray, dy: FloatArray) -> None:
+    """Write dy/dt (d, lanes) of many states y (d, lanes) side by side into dy; the system must not depend on time."""
+    raise NotImplementedError(f"no derivatives of many for {type(system).__name__}")

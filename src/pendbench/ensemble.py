@@ -1,0 +1,229 @@
+"""Many starts of one chain: compiled across trajectories, so that vector units work, and spread over threads."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pendbench.arrays import FloatArray
+from pendbench.errors import InputError, choose, printable
+from pendbench.scene import ANGLE, RATE, Scene, load_scene
+from pendbench.strict import show
+
+#: The methods that run across trajectories, those of the analytic engine with the same name.
+METHODS: Final = ("adaptive", "rk4")
+TOLERANCE: Final = 1e-10
+_TOLERANCES: Final = (1e-15, 1e-2)
+
+_LANES: Final = 64
+_CHUNK: Final = 4096
+_MOST_STEPS: Final = 10**9
+_SMALLEST: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Trajectories of one chain from K starts.
+
+    t (k,) s; theta, omega (k, K, n) rad, rad/s, nan where a trajectory ended before; status (K,): how each ended, a
+    word of `trajectory.STATUSES`.
+    """
+
+    t: FloatArray
+    theta: FloatArray
+    omega: FloatArray
+    status: npt.NDArray[np.str_]
+
+
+Progress = Callable[[int, int], None]
+
+
+def simulate_ensemble(
+    scene: Scene | str | os.PathLike[str],
+    angles: npt.ArrayLike,
+    rates: npt.ArrayLike | None = None,
+    *,
+    method: str = "adaptive",
+    dt: float | None = None,
+    times: npt.ArrayLike | None = None,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Ensemble:
+    """Run the scene's chain from each of the starts angles (K, n) rad, rates (K, n) rad/s (at rest without them).
+
+    times (k,) s, rising; the scene's duration alone where None. method: `adaptive` (dt None), with the local error
+    allowed per step; or `rk4`, whose times must be whole multiples of its step dt, s. threads: one for each processor
+    where None. progress(done, K) is called as trajectories are done; whatever it raises cancels the rest.
+
+    Results are those of `simulate` from each start, but for rounding. The states asked for, 16 k K n bytes, are all
+    that grows with K: whoever has no room for them asks for a part of the starts at a time.
+
+    Raises `InputError`, one line, for whatever cannot be used.
+    """
+    chosen = scene if isinstance(scene, Scene) else load_scene(scene)
+    starts = _starts(chosen, angles, rates)
+    asked = _times(times, chosen.duration)
+    workers = _workers(threads)
+    run = _runner(chosen, method, dt, asked, tolerance)
+    k, runs, n = len(asked), len(starts), chosen.n
+    states, status = np.empty((k, runs, 2 * n)), np.empty(runs, dtype="<U16")
+    for low, high, out, how in _in_chunks(run, starts, workers):
+        states[:, low:high], status[low:high] = out, how
+        if progress is not None:
+            progress(high, runs)
+    return Ensemble(asked, states[..., :n], states[..., n:], status)
+
+
+def first_flips(
+    scene: Scene | str | os.PathLike[str],
+    angles: npt.ArrayLike,
+    rates: npt.ArrayLike | None = None,
+    *,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> FloatArray:
+    """When a rod of the chain first goes over the top, |theta| = pi, from each start: (K,) s.
+
+    inf where that does not happen within the scene's duration, nan where a run ended badly. The arguments are those of
+    `simulate_ensemble`; no angle may begin beyond pi.
+    """
+    chosen = scene if isinstance(scene, Scene) else load_scene(scene)
+    starts = _starts(chosen, angles, rates)
+    if np.abs(starts[:, : chosen.n]).max(initial=0.0) > math.pi:
+        raise InputError("angles: one begins beyond pi; allowed: from -pi to pi")
+    run = _runner(chosen, "adaptive", None, np.array([chosen.duration]), tolerance, limit=math.pi, flips=True)
+    found = np.empty(len(starts))
+    for low, high, out, _ in _in_chunks(run, starts, _workers(threads)):
+        found[low:high] = out
+        if progress is not None:
+            progress(high, len(starts))
+    return found
+
+
+def _in_chunks(run: Callable[[FloatArray], tuple[Any, Any]], starts: FloatArray, workers: int) -> Iterator[Any]:
+    """The results of chunks of the starts, in order; a generator that is closed cancels those that have not begun."""
+    bounds = [(low, min(low + _CHUNK, len(starts))) for low in range(0, len(starts), _CHUNK)]
+    with ThreadPoolExecutor(workers) as pool:
+        waiting = [(low, high, pool.submit(run, starts[low:high])) for low, high in bounds[: 2 * workers]]
+        rest = iter(bounds[2 * workers :])
+        try:
+            while waiting:
+                low, high, future = waiting.pop(0)
+                yield low, high, *future.result()
+                if (following := next(rest, None)) is not None:
+                    waiting.append((*following, pool.submit(run, starts[slice(*following)])))
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _runner(
+    scene: Scene,
+    method: str,
+    dt: float | None,
+    times: FloatArray,
+    tolerance: float,
+    limit: float = math.inf,
+    *,
+    flips: bool = False,
+) -> Callable[[FloatArray], tuple[Any, Any]]:
+    """What runs some starts: their states (k, K, 2n) and statuses; or the times of their flips."""
+    if method not in METHODS:
+        raise InputError(f"simulate_ensemble: {choose('method', printable(str(method)), METHODS)}")
+    if not (isinstance(tolerance, float) and _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]):
+        raise InputError(
+            f"tolerance is {show(tolerance)}; allowed: a number from {_TOLERANCES[0]:g} to {_TOLERANCES[1]:g}"
+        )
+    if method == "rk4":
+        return _fixed_runner(scene, dt, times)
+    if dt is not None:
+        raise InputError(f"dt is {show(dt)}; allowed: none, since method 'adaptive' chooses its steps")
+    from pendbench.physics.many import many_system_of  # compiles or loads the kernels
+    from pendbench.solvers.many import integrate_many
+    from pendbench.solvers.outcome import CROSSED
+    from pendbench.solvers.tableaux import DOP853
+
+    relative = np.concatenate([np.zeros(scene.n), np.ones(scene.n)])
+
+    def run(starts: FloatArray) -> tuple[Any, Any]:
+        out = np.full((len(times), len(starts), 2 * scene.n), np.nan)
+        outcomes, stopped = np.zeros(len(starts), np.int64), np.zeros(len(starts))
+        system, limits = many_system_of(scene, _LANES), (tolerance, relative, _SMALLEST, _MOST_STEPS)
+        integrate_many(system, DOP853, starts, times, *limits, _LANES, out, outcomes, stopped, limit)
+        if flips:
+            return np.where(outcomes == CROSSED, stopped, np.where(outcomes == 0, np.inf, np.nan)), None
+        return out, _words(outcomes)
+
+    return run
+
+
+def _fixed_runner(scene: Scene, dt: float | None, times: FloatArray) -> Callable[[FloatArray], tuple[Any, Any]]:
+    from pendbench.physics.many import many_system_of
+    from pendbench.solvers.many import runge_kutta_many
+    from pendbench.solvers.tableaux import RK4
+
+    if not isinstance(dt, float) or not 0.0 < dt <= float(times[-1]):
+        raise InputError(f"dt is {show(dt)}; allowed: a step, s, of at most {times[-1]:g}")
+    counts = np.rint(times / dt)
+    if np.abs(times / dt - counts).max() > 1e-6:
+        raise InputError(f"times: allowed: whole multiples of dt = {dt:g} s")
+
+    def run(starts: FloatArray) -> tuple[Any, Any]:
+        out = np.empty((len(times), len(starts), 2 * scene.n))
+        runge_kutta_many(many_system_of(scene, _LANES), RK4, starts, counts.astype(np.int64), dt, _LANES, out)
+        whole = np.isfinite(out).all(axis=(0, 2))
+        return out, np.where(whole, "ok", "not finite")
+
+    return run
+
+
+def _words(outcomes: Any) -> npt.NDArray[np.str_]:
+    from pendbench.solvers.outcome import REASONS
+
+    words = {outcome: status for outcome, (status, _) in REASONS.items()}
+    return np.array([words.get(int(outcome), "ok") for outcome in outcomes])
+
+
+def _starts(scene: Scene, angles: npt.ArrayLike, rates: npt.ArrayLike | None) -> FloatArray:
+    theta = _table("angles", angles, scene.n, ANGLE)
+    omega = np.zeros_like(theta) if rates is None else _table("rates", rates, scene.n, RATE)
+    if omega.shape != theta.shape:
+        raise InputError(f"rates has shape {omega.shape}; allowed: that of angles, {theta.shape}")
+    return np.concatenate([theta, omega], axis=1)
+
+
+def _table(name: str, values: npt.ArrayLike, n: int, allowed: Any) -> FloatArray:
+    try:
+        table = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is no table of numbers; allowed: shape (K, {n})") from None
+    if table.ndim != 2 or table.shape[1] != n or not len(table):
+        raise InputError(f"{name} has shape {table.shape}; allowed: (K, {n}), a row for each start")
+    if not np.all((table >= allowed.low) & (table <= allowed.high)):
+        raise InputError(
+            f"{name} holds a number out of range; allowed: {allowed.low:g} to {allowed.high:g} {allowed.unit}"
+        )
+    return table
+
+
+def _times(times: npt.ArrayLike | None, duration: float) -> FloatArray:
+    asked = np.array([duration] if times is None else times, dtype=np.float64)
+    if asked.ndim != 1 or not asked.size or not np.isfinite(asked).all() or asked[0] < 0 or np.any(np.diff(asked) <= 0):
+        raise InputError("times is not in order; allowed: finite times from 0 on, each later than the one before, s")
+    return asked
+
+
+def _workers(threads: int | None) -> int:
+    if threads is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if type(threads) is not int or not 1 <= threads <= 1024:
+        raise InputError(f"threads is {show(threads)}; allowed: 1 to 1024")
+    return threads

@@ -1,0 +1,331 @@
+"""The loop with error control for many runs side by side, each with its own steps.
+
+Runs share nothing but the instructions: a lane takes a step of its own length, keeps or rejects it by itself, and when
+its run is done it takes up the next one, so all lanes stay at work until none is left. The steps are those that
+`adaptive.integrate` takes for one run, but for rounding.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pendbench.arrays import FloatArray
+from pendbench.compiled import compiled_for_threads, inlined
+from pendbench.solvers.adaptive import FIRST_STEP
+from pendbench.solvers.copying import copy
+from pendbench.solvers.explicit import add_stages
+from pendbench.solvers.outcome import CROSSED, DONE, NOT_FINITE, TOO_MANY, TOO_SMALL
+from pendbench.solvers.problem import derivatives_of_many
+from pendbench.solvers.tableaux import EmbeddedPair, Tableau
+
+_SAFETY, _GROW_AT_MOST, _SHRINK_AT_MOST = 0.9, 5.0, 0.2
+
+# The rows of what each lane knows of its time.
+_T, _H, _STEP, _GROW = range(4)
+# And of its work: which run it is at, which time comes next, how many steps it has taken.
+_RUN, _NEXT, _TAKEN = range(3)
+_IDLE = -1
+
+
+@inlined
+def _clear(values: FloatArray) -> None:
+    for i in range(len(values)):
+        values[i] = 0.0
+
+
+@inlined
+def _times_step(slopes: FloatArray, step: FloatArray) -> None:
+    """Multiply (d, lanes) by each lane's step: what is left of the method is the same for all lanes."""
+    for i in range(slopes.shape[0]):
+        for b in range(slopes.shape[1]):
+            slopes[i, b] *= step[b]
+
+
+@inlined
+def _write_worst(part: FloatArray, y: FloatArray, relative: FloatArray, tolerance: float, out: FloatArray) -> None:
+    """Write the largest of each lane's errors (d, lanes), each over what is allowed, into out (lanes,)."""
+    _clear(out)
+    for i in range(part.shape[0]):
+        share = relative[i]
+        for b in range(part.shape[1]):
+            size = abs(part[i, b]) / (tolerance * (1.0 + share * abs(y[i, b])))
+            out[b] = out[b] if size <= out[b] else size  # nan is kept
+
+
+@inlined
+def _combine(worst5: FloatArray, worst3: FloatArray) -> None:
+    """Leave the two estimates, combined as in Hairer's DOP853, in the first."""
+    for b in range(len(worst5)):
+        together = np.sqrt(worst5[b] * worst5[b] + 0.01 * worst3[b] * worst3[b])
+        worst5[b] = worst5[b] * worst5[b] / together if together > 0.0 else worst5[b]
+
+
+@inlined
+def _factors(errors: FloatArray, out: FloatArray) -> None:
+    """By how much each step may change: the eighth root, which vectorises as three square roots."""
+    for b in range(len(out)):
+        wanted = _SAFETY / np.sqrt(np.sqrt(np.sqrt(errors[b])))
+        wanted = wanted if wanted < _GROW_AT_MOST else _GROW_AT_MOST
+        out[b] = wanted if wanted > _SHRINK_AT_MOST else _SHRINK_AT_MOST  # nan shrinks
+
+
+@inlined
+def _propose_all(lane: FloatArray, work: Any, times: FloatArray) -> bool:
+    """The next step of every lane, none for an idle one; whether any is at work."""
+    busy = False
+    for b in range(lane.shape[1]):
+        lane[_STEP, b] = 0.0
+        if work[_RUN, b] != _IDLE:
+            busy = True
+            _propose(lane, b, times[work[_NEXT, b]])
+    return busy
+
+
+@inlined
+def _propose(lane: FloatArray, b: int, end: float) -> None:
+    """The next step of a lane, whose length is such that time does not slip: as in `adaptive.integrate`."""
+    t, h = lane[_T, b], lane[_H, b]
+    left = end - t
+    if h < left:
+        target = t + (0.5 * left if h > 0.5 * left else h)
+        lane[_STEP, b] = target - t
+    else:
+        lane[_STEP, b] = left
+
+
+@compiled_for_threads
+def integrate_many(
+    system: Any,
+    method: EmbeddedPair,
+    starts: FloatArray,
+    times: FloatArray,
+    tolerance: float,
+    relative: FloatArray,
+    smallest: float,
+    most_steps: int,
+    lanes: int,
+    out: FloatArray,
+    outcomes: Any,
+    stopped: FloatArray,
+    limit: float,
+) -> None:
+    """Run from each of `starts` (K, d) at time 0 and write its states at `times` (m,) s, rising, into out (m, K, d).
+
+    outcomes (K,), integers: how each run ended; one that gave up leaves nan where it has no states. stopped (K,): the
+    time it reached, s. A run that passes `limit` in one of the first d / 2 components of its state is over: its outcome
+    is CROSSED, and stopped the time of the crossing, from the cubic through the states at both ends of the step. The
+    other arguments are those of `adaptive.integrate`; method must be of order 8. The system has room for `lanes`.
+    """
+    d, stages = starts.shape[1], len(method.b)
+    # The same memory twice: rows by lanes, and flat for what does not care.
+    before = np.zeros((d, lanes))
+    y, carry, inner, slopes = (
+        np.zeros((d, lanes)),
+        np.zeros((d, lanes)),
+        np.zeros((d, lanes)),
+        np.zeros((stages, d, lanes)),
+    )
+    flat_y, flat_inner, flat_slopes = y.reshape(-1), inner.reshape(-1), slopes.reshape(stages, -1)
+    lane, room, factor = np.zeros((4, lanes)), np.zeros((2, lanes)), np.zeros(lanes)
+    step, error = lane[_STEP], room[0]
+    work = np.full((3, lanes), _IDLE)
+    waiting = 0
+    for b in range(lanes):
+        waiting = _take_up(b, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+    while _propose_all(lane, work, times):
+        for s in range(stages):
+            copy(flat_y, flat_inner)
+            add_stages(method.a[s], s, 1.0, flat_slopes, flat_inner)
+            derivatives_of_many(system, inner, slopes[s])
+            _times_step(slopes[s], step)
+        for weights, worst in ((method.error5, error), (method.error3, room[1])):
+            _clear(flat_inner)
+            add_stages(weights, stages, 1.0, flat_slopes, flat_inner)
+            _write_worst(inner, y, relative, tolerance, worst)
+        _combine(error, room[1])
+        _factors(error, factor)
+        _clear(flat_inner)
+        add_stages(method.b, stages, 1.0, flat_slopes, flat_inner)
+        for i in range(d):
+            for b in range(lanes):
+                small = inner[i, b] + carry[i, b] if error[b] <= 1.0 else 0.0
+                before[i, b] = y[i, b]
+                total = y[i, b] + small
+                carry[i, b] = small - (total - y[i, b]) if error[b] <= 1.0 else carry[i, b]
+                y[i, b] = total
+        for b in range(lanes):
+            if work[_RUN, b] != _IDLE:
+                how = _judge(b, error[b], factor[b], times, smallest, most_steps, lane, work)
+                if limit < np.inf and error[b] <= 1.0:
+                    _look_for_crossing(b, before, y, lane, work, limit, outcomes, stopped)
+                    if outcomes[work[_RUN, b]] == CROSSED:
+                        waiting = _take_up(b, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+                        continue
+                waiting = _settle(b, how, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+
+
+@compiled_for_threads
+def _judge(
+    b: int,
+    error: float,
+    factor: float,
+    times: FloatArray,
+    smallest: float,
+    most_steps: int,
+    lane: FloatArray,
+    work: Any,
+) -> int:
+    """Move a lane's clock on, or shrink its step; and whether it has to give up: DONE where not."""
+    end, t, h, step = times[work[_NEXT, b]], lane[_T, b], lane[_H, b], lane[_STEP, b]
+    last = h >= end - t
+    work[_TAKEN, b] += 1
+    if error <= 1.0:
+        lane[_T, b] = end if last else t + step
+        grown = step * min(factor, lane[_GROW, b])
+        lane[_H, b] = max(h, grown) if last else grown
+        lane[_GROW, b] = _GROW_AT_MOST
+    else:
+        lane[_GROW, b] = 1.0
+        lane[_H, b] = step * min(factor, 1.0)
+        if not np.isfinite(error) and work[_TAKEN, b] > 1 and lane[_H, b] < smallest:
+            return NOT_FINITE
+        if lane[_H, b] < smallest or t + 0.1 * lane[_H, b] == t:
+            return TOO_SMALL
+    return DONE if work[_TAKEN, b] < most_steps else TOO_MANY
+
+
+@compiled_for_threads
+def _look_for_crossing(
+    b: int,
+    before: FloatArray,
+    y: FloatArray,
+    lane: FloatArray,
+    work: Any,
+    limit: float,
+    outcomes: Any,
+    stopped: FloatArray,
+) -> None:
+    """Where the step of a lane took it past the limit, write down when."""
+    angles, step, earliest = y.shape[0] // 2, lane[_STEP, b], np.inf
+    for i in range(angles):
+        if abs(y[i, b]) > limit:
+            end = limit if y[i, b] > 0.0 else -limit
+            share = _share_of_step(before[i, b], before[angles + i, b], y[i, b], y[angles + i, b], step, end)
+            earliest = min(earliest, share)
+    if earliest < np.inf:
+        run = work[_RUN, b]
+        outcomes[run] = CROSSED
+        stopped[run] = lane[_T, b] - (1.0 - earliest) * step
+
+
+@compiled_for_threads
+def _share_of_step(q0: float, v0: float, q1: float, v1: float, h: float, end: float) -> float:
+    """Where, as a share of the step h, the cubic with values q and slopes v at its ends first comes to `end`."""
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        s = 0.5 * (low + high)
+        r = 1.0 - s
+        q = r * r * (1.0 + 2.0 * s) * q0 + s * s * (3.0 - 2.0 * s) * q1 + s * r * h * (r * v0 - s * v1)
+        if (q - end) * (q1 - end) > 0.0:
+            high = s
+        else:
+            low = s
+    return high
+
+
+@compiled_for_threads
+def _settle(
+    b: int,
+    how: int,
+    waiting: int,
+    starts: FloatArray,
+    times: FloatArray,
+    y: FloatArray,
+    carry: FloatArray,
+    lane: FloatArray,
+    work: Any,
+    out: FloatArray,
+    outcomes: Any,
+    stopped: FloatArray,
+) -> int:
+    """Write down the states that a lane has reached; where its run is over, give it the next one."""
+    run = work[_RUN, b]
+    stopped[run] = lane[_T, b]
+    if lane[_T, b] == times[work[_NEXT, b]]:
+        for i in range(len(y)):
+            out[work[_NEXT, b], run, i] = y[i, b]
+        work[_NEXT, b] += 1
+        if work[_NEXT, b] == len(times):
+            outcomes[run] = DONE
+            return _take_up(b, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+    if how != DONE:
+        outcomes[run] = how
+        return _take_up(b, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+    return waiting
+
+
+@compiled_for_threads
+def _take_up(
+    b: int,
+    waiting: int,
+    starts: FloatArray,
+    times: FloatArray,
+    y: FloatArray,
+    carry: FloatArray,
+    lane: FloatArray,
+    work: Any,
+    out: FloatArray,
+    outcomes: Any,
+    stopped: FloatArray,
+) -> int:
+    """Give a lane the next run that waits, and return which one waits then; without one the lane is idle."""
+    work[_RUN, b] = _IDLE
+    while waiting < len(starts):
+        run = waiting
+        waiting += 1
+        for i in range(len(y)):
+            y[i, b], carry[i, b] = starts[run, i], 0.0
+        lane[_T, b], lane[_H, b], lane[_GROW, b] = 0.0, FIRST_STEP, _GROW_AT_MOST
+        first = 0
+        if times[0] == 0.0:
+            for i in range(len(y)):
+                out[0, run, i] = starts[run, i]
+            first = 1
+        work[_NEXT, b], work[_TAKEN, b] = first, 0
+        outcomes[run], stopped[run] = DONE, 0.0
+        if first < len(times):
+            work[_RUN, b] = run
+            return waiting
+    return waiting
+
+
+@compiled_for_threads
+def runge_kutta_many(
+    system: Any, method: Tableau, starts: FloatArray, counts: Any, dt: float, lanes: int, out: FloatArray
+) -> None:
+    """Run from each of `starts` (K, d) with steps of dt (s), and write the states into out (m, K, d).
+
+    counts (m,), rising: after how many steps. The system has room for `lanes` states.
+    """
+    runs, d = starts.shape
+    stages = len(method.b)
+    y, inner, slopes = np.zeros((d, lanes)), np.zeros((d, lanes)), np.zeros((stages, d, lanes))
+    flat_y, flat_inner, flat_slopes = y.reshape(-1), inner.reshape(-1), slopes.reshape(stages, -1)
+    for first in range(0, runs, lanes):
+        for b in range(lanes):
+            for i in range(d):
+                y[i, b] = starts[min(first + b, runs - 1), i]
+        taken = 0
+        for at in range(len(counts)):
+            for _ in range(counts[at] - taken):
+                for s in range(stages):
+                    copy(flat_y, flat_inner)
+                    add_stages(method.a[s], s, dt, flat_slopes, flat_inner)
+                    derivatives_of_many(system, inner, slopes[s])
+                add_stages(method.b, stages, dt, flat_slopes, flat_y)
+            taken = counts[at]
+            for b in range(min(lanes, runs - first)):
+                for i in range(d):
+                    out[at, first + b, i] = y[i, b]
