@@ -162,14 +162,15 @@ def _flag(name: str) -> mujoco.mjtDisableBit:
 
 
 def main() -> None:
-    """Write models/mjcf/NAME.xml for every bundled scene."""
+    """Write models/mjcf/NAME.xml for every bundled scene that a file can hold."""
     from pendbench.bundled import bundled, bundled_names
     from pendbench.scene import load_scene
 
     folder = bundled("models") / "mjcf"
     folder.mkdir(exist_ok=True)
-    for name in bundled_names("models"):
-        (folder / f"{name}.xml").write_text(write_mjcf(load_scene(name)), encoding="utf-8", newline="\n")
+    for scene in map(load_scene, bundled_names("models")):
+        if scene.n <= DEEPEST_FILE:
+            (folder / f"{scene.name}.xml").write_text(write_mjcf(scene), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

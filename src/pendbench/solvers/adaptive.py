@@ -17,9 +17,14 @@ from pendbench.solvers.tableaux import EmbeddedPair
 #: A first step to try, s. Error control shrinks it where it is too large.
 FIRST_STEP = 1e-3
 
+_EPS = 2.0**-52
 _SAFETY = 0.9
 _GROW_AT_MOST = 5.0
 _SHRINK_AT_MOST = 0.2
+
+# A step is not to be better than so many times what the last digits of its start make of it. Where nothing else was
+# left (angles of a million turns), the errors of 1800 steps had 0.7 times that for their median and 5 for the worst.
+_ROUNDINGS = 4.0
 
 
 @compiled
@@ -38,6 +43,25 @@ def _scaled_error(method: EmbeddedPair, h: float, k: FloatArray, scale: FloatArr
     if worst5 == 0.0:
         return 0.0
     return abs(h) * worst5 * worst5 / math.hypot(worst5, 0.1 * worst3)
+
+
+@compiled
+def _rounding_error(
+    system: Any, t: float, h: float, y: FloatArray, k: FloatArray, scale: FloatArray, near: FloatArray, out: FloatArray
+) -> float:
+    """The scaled change of y within h (s) where its last digits are others; 0 where that is not finite.
+
+    k (d,): the derivative at y. near and out (d,): room for the other state and its derivative. Neighbours in y, such
+    as the angles of two rods, are moved apart: that changes most.
+    """
+    for i in range(len(y)):
+        near[i] = y[i] + (_EPS if i % 2 else -_EPS) * abs(y[i])
+    derivative(system, t, near, out)
+    worst = 0.0
+    for i in range(len(y)):
+        size = abs(out[i] - k[i]) / scale[i]
+        worst = worst if size <= worst else size  # nan is kept
+    return abs(h) * worst if worst < np.inf else 0.0
 
 
 @compiled
@@ -78,9 +102,10 @@ def integrate(
     """Advance y (d,), in place, from time t to exactly `end` with steps that keep the local error allowed.
 
     h: the first step to try (s). carry (d,): what rounding left out of y, kept between calls. relative (d,): the error
-    allowed in y[i] is `tolerance (1 + relative[i] |y[i]|)`. Gives up where it needs a step below `smallest` (s)
-    or below the rounding of t (only the last step, onto `end`, may be as short as it likes), after `most_steps`
-    accepted or rejected, or at a state that is not finite.
+    allowed in y[i] is `tolerance (1 + relative[i] |y[i]|)`, or what the rounding of y makes of a step where that is
+    more: that falls no faster than the step does, so shorter steps would add up to as much. Gives up where it needs a
+    step below `smallest` (s) or below the rounding of t (only the last step, onto `end`, may be as short as it likes),
+    after `most_steps` accepted or rejected, or at a state that is not finite.
 
     Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.4 (step control) and II.10.
     """
@@ -108,6 +133,9 @@ def integrate(
         if not np.all(np.isfinite(k[0])):
             return Progress(NOT_FINITE, t, h, accepted, rejected)
         error = _scaled_error(method, step, k, scale)
+        if 1.0 < error < np.inf:
+            rounding = _rounding_error(system, t, step, y, k[0], scale, inner, change)
+            error /= max(1.0, _ROUNDINGS * rounding)
         factor = _step_factor(error, method.order)
         if error <= 1.0:
             change[:] = 0.0
