@@ -208,6 +208,45 @@ class Hanging(Engine):
     run = HangingRun
 
 
+class HungryRun(Run):
+    """Takes 20 GB."""
+
+    def step(self) -> None:
+        if self.late:
+            self.hoard = [np.empty(100_000_000, np.uint8) for _ in range(200)]  # never written to: no harm
+        super().step()
+
+
+class Hungry(Engine):
+    name = "hungry"
+    run = HungryRun
+
+
+class ChattyRun(Run):
+    """Prints a megabyte, and does well."""
+
+    def __init__(self, scene: Scene, dt: float) -> None:
+        super().__init__(scene, dt)
+        print("x" * 1_000_000)
+
+
+class Chatty(Engine):
+    name = "chatty"
+    run = ChattyRun
+
+
+class MisshapenRun(Run):
+    """Gives a column where a row is asked for."""
+
+    def state(self) -> State:
+        return State(self.theta[:, np.newaxis], self.omega)
+
+
+class Misshapen(Engine):
+    name = "misshapen"
+    run = MisshapenRun
+
+
 class ResetRun(Run):
     """Starts again from its initial state, and says so."""
 
@@ -251,7 +290,8 @@ class Picky(Engine):
 
 
 CLASSES = (
-    Heavy, Misprint, Half, Single, Oracle, Lazy, Lost, Crashing, Hanging, Reset, Raising, Picky
+    Heavy, Misprint, Half, Single, Oracle, Lazy, Lost, Crashing, Hanging, Hungry, Chatty, Misshapen, Reset, Raising,
+    Picky,
 )  # fmt: skip
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import sys
 import time
 from pathlib import Path
+
+import numpy as np
 
 from pendbench.errors import InputError
 
@@ -46,6 +49,48 @@ def exhaust() -> None:
     raise MemoryError
 
 
+_kept: list[object] = []
+_PIECE = 100_000_000
+
+
+def take(gigabytes: float) -> int:
+    """Take memory piece by piece, and give it back at the end."""
+    return len(_pieces(gigabytes))
+
+
+def take_and_keep(gigabytes: float) -> int:
+    """Take memory and never give it back. Returns in which process."""
+    _kept.extend(_pieces(gigabytes))
+    return os.getpid()
+
+
+def _pieces(gigabytes: float) -> list[object]:
+    return [np.empty(_PIECE, np.uint8) for _ in range(round(gigabytes * 1e9 / _PIECE))]  # never written to: no harm
+
+
+def take_or_abort(gigabytes: float) -> None:
+    """As a C++ program does that nobody has told about memory."""
+    malloc = ctypes.CDLL(None).malloc
+    malloc.argtypes, malloc.restype = [ctypes.c_size_t], ctypes.c_void_p
+    if malloc(int(gigabytes * 1e9)) is None:
+        os.abort()
+
+
+def reserve(gigabytes: float) -> str:
+    """Reserve address space, as compilers do, without any memory behind it."""
+    mmap = ctypes.CDLL(None, use_errno=True).mmap
+    mmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_long]
+    mmap.restype = ctypes.c_void_p
+    private_and_anonymous = 0x22
+    found = mmap(None, int(gigabytes * 1e9), 0, private_and_anonymous, -1, 0)
+    return "failed" if found == ctypes.c_void_p(-1).value else "reserved"
+
+
+def record_of_exhaustion() -> dict[str, str]:
+    """What a run returns that had too little memory and lived to tell."""
+    return {"status": "out of memory", "reason": "MemoryError"}
+
+
 def leave() -> None:
     sys.exit("done")
 
@@ -56,6 +101,10 @@ def kill_itself() -> None:
 
 def leave_at_once() -> None:
     os._exit(7)
+
+
+def leave_used_up() -> None:
+    os._exit(87)
 
 
 def sleep(seconds: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -21,6 +22,7 @@ starts        = 0
 sample        = 0.05
 lyapunov_time = 10.0
 time_limit    = 8.0
+memory_limit  = 1.0
 """
 
 GOOD = """
@@ -135,6 +137,7 @@ def test_who_takes_no_steps_is_too_good(rows):
         ("lost", "not finite", "an angle or a rate is not finite at t = 1.05 s"),
         ("crashing", "crashed", "the process died of SIGSEGV"),
         ("hanging", "timed out", "took longer than 8 s"),
+        ("misshapen", "error", "state() gave theta (2, 1) and omega (2,); a chain of 2 has (2,)"),
         ("reset", "reset", "its clock is behind"),
         ("raising", "error", "RuntimeError: no opinion"),
         ("picky", "refused", "no chain of 2\\nlinks"),
@@ -145,11 +148,25 @@ def test_a_run_that_fails_is_a_row_with_its_status_and_reason(rows, engine, stat
     assert one(rows, engine, "reason") == reason
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux only")
+def test_a_run_that_takes_too_much_memory_is_a_row_that_names_the_limit(rows):
+    assert one(rows, "hungry", "status") == "out of memory"
+    assert "MemoryError: Unable to allocate" in one(rows, "hungry", "reason")
+    assert one(rows, "hungry", "reason").endswith("; the limit is 1 GB")
+
+
+def test_a_run_that_prints_a_megabyte_is_a_row_like_any_other(rows):
+    assert one(rows, "chatty", "status") == "ok"
+    assert set(told(rows, "chatty")) <= {""}
+    good = rows[(rows.engine == "analytic") & (rows.dt == 0.01)]
+    assert one(rows, "chatty", "error_max") == pytest.approx(good.error_max.item(), rel=1e-3)
+
+
 def test_a_run_that_fails_has_the_numbers_from_before_and_no_others(rows):
-    for engine in ("lost", "reset"):
+    for engine in ("lost", "reset", "hungry"):
         assert 0 < one(rows, engine, "error_max") < 1e-5
         assert one(rows, engine, "t_1e-3_s") == pytest.approx(1.05), "it left the truth when it ended"
-    for engine in ("crashing", "hanging", "raising", "picky"):
+    for engine in ("crashing", "hanging", "misshapen", "raising", "picky"):
         for name in ("error_max", "energy_drift_max", "t_1e-3_s"):
             assert rows_of(rows, engine)[name].isna().all(), (engine, name)
     for engine in ("raising", "picky"):

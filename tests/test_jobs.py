@@ -8,9 +8,11 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 from pathlib import Path
 
 import pytest
+from pebble import CONSTS
 
 import job_functions as does
 from pendbench.errors import InputError
@@ -33,8 +35,8 @@ def pool():
         yield made
 
 
-def job(function, *arguments, key: str = "", limit: float = 60.0) -> Job:
-    return Job(key or function.__name__, function, arguments, limit)
+def job(function, *arguments, key: str = "", limit: float = 60.0, memory: float | None = None) -> Job:
+    return Job(key or function.__name__, function, arguments, limit, memory)
 
 
 def outcomes(pool, *jobs: Job, alone: bool = False) -> dict[str, Outcome]:
@@ -96,6 +98,54 @@ def test_whatever_becomes_of_a_job_is_an_outcome_and_the_others_go_on(capfd):
         assert found[name].fault == ("timed out", "took longer than 0.5 s")
     assert [found[f"good {i}"].value for i in range(len(bad))] == list(range(len(bad)))
     assert capfd.readouterr() == ("", "")  # nobody has to read what a worker thinks of it
+
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux only")
+
+
+@LINUX
+def test_a_job_that_takes_too_much_memory_is_an_outcome_and_the_next_one_has_its_own_share(pool):
+    jobs = [job(does.take, 20.0, key=f"much {i}", memory=0.6) for i in range(2 * WORKERS)]
+    jobs += [job(does.take, 0.5, key=f"little {i}", memory=0.6) for i in range(2 * WORKERS)]
+    jobs.append(job(does.take_or_abort, 20.0, key="aborts", memory=0.6))
+    jobs.append(job(does.record_of_exhaustion, key="tells", memory=0.6))
+    found = outcomes(pool, *jobs)
+    for i in range(2 * WORKERS):
+        status, reason = found[f"much {i}"].fault
+        assert status == "out of memory"
+        assert "MemoryError: Unable to allocate 95.4 MiB" in reason
+        assert reason.endswith("; the limit is 0.6 GB")
+        assert found[f"little {i}"].value == 5
+    reason = "the process died of SIGABRT, perhaps for want of memory; the limit is 0.6 GB"
+    assert found["aborts"].fault == ("crashed", reason)
+    assert found["tells"].value == {"status": "out of memory", "reason": "MemoryError; the limit is 0.6 GB"}
+
+
+def test_without_a_limit_of_memory_there_is_none(pool):
+    found = outcomes(pool, job(does.take, 3.0), job(does.exhaust), job(does.record_of_exhaustion))
+    assert found["take"].value == 30
+    assert found["exhaust"].fault.reason == "MemoryError"
+    assert found["record_of_exhaustion"].value == does.record_of_exhaustion()
+
+
+@LINUX
+def test_address_space_is_not_memory(pool):
+    assert outcomes(pool, job(does.reserve, 20.0, memory=0.6))["reserve"].value == "reserved"
+    assert outcomes(pool, job(does.take, 3.0))["take"].value == 30, "the limit ends with its job"
+
+
+@LINUX
+def test_what_jobs_leave_behind_is_no_burden_on_others_and_does_not_grow_for_ever():
+    with LocalPool(1) as pool:
+        kept = [job(does.take_and_keep, 0.4, key=str(i), memory=0.6) for i in range(5)]
+        pids = [outcome.value for outcome in pool.run(kept, alone=True)]
+    assert None not in pids
+    assert pids[0] == pids[1], "less than the limit is left behind: the worker goes on"
+    assert len(set(pids)) == 3
+
+
+def test_a_job_that_leaves_as_a_used_up_worker_does_is_not_tried_for_ever(pool):
+    assert outcomes(pool, job(does.leave_used_up))["leave_used_up"].fault.status == "crashed"
 
 
 def test_a_function_that_workers_cannot_find_is_an_outcome(pool, monkeypatch):
@@ -160,6 +210,42 @@ def test_an_error_ends_the_pool_at_once_and_its_processes_with_it():
         raise KeyboardInterrupt
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+def test_stopping_many_workers_takes_no_longer_than_stopping_one():
+    with pytest.raises(KeyboardInterrupt), LocalPool(3) as pool:  # noqa: PT012
+        next(pool.run([job(os.getpid), *(job(does.sleep_deaf, 600.0, key=str(i)) for i in range(3))]))
+        raise KeyboardInterrupt
+    assert CONSTS.term_timeout * 3 <= 0.5  # s to each, one after the other
+
+
+def test_workers_end_with_the_process_that_started_them(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        textwrap.dedent("""
+            import os, signal, time
+            from pendbench.study.jobs import Job, LocalPool
+            if __name__ == "__main__":
+                with LocalPool(1) as pool:
+                    found = pool.run([Job("a", os.getpid, (), 60.0), Job("b", time.sleep, (3600.0,), 3600.0)])
+                    print(next(found).value, flush=True)
+                    time.sleep(1.0)  # so that the other one has begun
+                    os.kill(os.getpid(), signal.SIGKILL)
+        """)
+    )
+    ran = subprocess.run([sys.executable, str(script)], stdout=subprocess.PIPE, timeout=60, check=False)
+    assert ran.returncode == -signal.SIGKILL
+    assert_gone(int(ran.stdout))
+
+
+def assert_gone(pid: int) -> None:
+    for _ in range(3000):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return
+        threading.Event().wait(0.01)
+    raise AssertionError("it is still there")
 
 
 def test_a_job_is_packed_before_it_is_sent(pool):

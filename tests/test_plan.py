@@ -34,6 +34,7 @@ title         = "A study"
 kind          = "chaos"
 scenes        = ["double", "triple"]
 time_limit    = 5.0
+memory_limit  = 2
 starts        = 2
 perturbation  = 0.1
 seed          = 5
@@ -103,6 +104,7 @@ def test_a_plan_holds_every_scene_with_every_method_step_and_setting(write):
     ]
     assert len(plan.cases) == 12
     assert [scene.name for scene in plan.scenes] == ["double", "triple"]
+    assert (plan.options.time_limit, plan.options.memory_limit) == (5.0, 2.0)
     assert (plan.name, plan.quick, plan.options.starts, plan.options.seed) == ("mine", False, 2, 5)
     assert all(isinstance(value, int) for case in plan.cases for name, value in case.settings if name == "iterations")
     assert all(isinstance(case.dt, float) for case in plan.cases if case.dt is not None)
@@ -195,6 +197,10 @@ WRONG = {
     "engine, a number": (changed('"analytic"', "1"), AT + "name is 1; allowed: text in quotes"),
     "no name": (changed('name    = "analytic"\n', ""), AT + "missing key 'name'"),
     "method": (changed('"rk4"', '"rk5"'), AT + "unknown method 'rk5'; did you mean 'rk4'? allowed: "),
+    "optional engine": (
+        changed('"analytic"', '"analytik"\noptional = true'),
+        AT + "unknown engine 'analytik'; did you mean 'analytic'? allowed: ",
+    ),
     "no methods": (changed('methods = ["rk4"]\n', ""), AT + "missing key 'methods'"),
     "empty methods": (changed('["rk4"]', "[]"), AT + "methods is an empty list; allowed: 1 or more"),
     "methods, a text": (changed('["rk4"]', '"rk4"'), AT + "methods is 'rk4'; allowed: a list"),
@@ -234,6 +240,9 @@ WRONG = {
     "seed": ("seed = -1\n" + GOOD, ": seed is -1; allowed: 0 or more"),
     "perturbation": ("perturbation = nan\n" + GOOD, ": perturbation is nan; allowed: a finite number"),
     "time_limit": ("time_limit = 0\n" + GOOD, ": time_limit is 0; allowed: above 0"),
+    "memory_limit": ("memory_limit = 0.4\n" + GOOD, ": memory_limit is 0.4; allowed: 0.5 or more"),
+    "memory_limit, a text": ('memory_limit = "4 GB"\n' + GOOD, ": memory_limit is '4 GB'; allowed: a number"),
+    "memory_limit, no number": ("memory_limit = nan\n" + GOOD, ": memory_limit is nan; allowed: a finite number"),
     "sample": ("sample = 0\n" + GOOD, ": sample is 0; allowed: above 0"),
     "sample, too short": (
         "sample = 1e-300\n" + GOOD,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pendbench.engines.protocol import Fault
@@ -60,6 +62,41 @@ def test_what_failed_is_tried_again_the_next_time(store, status):
     assert run(store, Scripted(Outcome(A, fault=Fault(status, ""))), [A]) == {A.key: [A.key, status]}
     assert store.load(A.key) is None
     assert run(store, Scripted(Outcome(A, "a")), [A]) == {A.key: "a"}
+
+
+def test_a_run_without_enough_memory_is_a_value_and_is_tried_again_the_next_time(store):
+    short = {"status": "out of memory", "reason": "MemoryError; the limit is 1 GB", "error_max": 1e-9}
+    assert run(store, Scripted(Outcome(A, short)), [A]) == {A.key: short}
+    assert run(store, Scripted(Outcome(A, {"status": "ok"})), [A]) == {A.key: {"status": "ok"}}
+
+
+def test_what_builds_upon_a_job_that_failed_is_kept_apart(store):
+    """As the comparison with a truth: without one it has another value, and the same key."""
+    upon = Job(key_of("upon"), str, (1, A.key), 1.0)
+
+    def study(first: Outcome, *second: Outcome):
+        runner = Runner(store, Scripted())
+        for stage, script in (([A], [first]), ([upon, B], second)):
+            runner.executor.script = [*script]
+            found = runner.run("stage", stage, lambda *_: None)
+        return found, runner.executor.asked[1][0]
+
+    without, whole = Outcome(upon, "no truth"), Outcome(upon, "compared")
+    failed = Outcome(A, fault=FAULT)
+    for bad in (failed, Outcome(A, {"status": "out of memory"})):
+        found, asked = study(bad, without, Outcome(B, "b"))
+        assert found == {upon.key: "no truth", B.key: "b"}
+    assert asked == [], "it is kept, though"
+    found, asked = study(Outcome(A, "a"), whole)
+    assert found == {upon.key: "compared", B.key: "b"}
+    assert asked == [upon]
+    assert study(Outcome(A, "a"))[0] == found
+
+
+def test_every_job_has_the_memory_that_the_study_allows(store):
+    executor = Scripted(Outcome(A, "a"))
+    Runner(store, executor, memory_limit=2.5).run("stage", [A], lambda *_: None)
+    assert executor.asked == [([replace(A, memory_limit=2.5)], False)]
 
 
 def test_a_watcher_hears_of_every_job(store):

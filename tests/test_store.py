@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import math
 import os
+import queue
+import sys
+import threading
 
 import numpy as np
 import pytest
 
-from pendbench.files import write_whole
+from pendbench.files import alone_in, write_whole
 from pendbench.study import store as store_module
 from pendbench.study.store import Store, key_of, source_digest
 
@@ -98,6 +101,16 @@ def test_a_record_that_was_cut_off_is_no_record(store):
         assert store.load(KEY) is None, length
 
 
+def test_a_record_with_a_bad_byte_is_no_record(store):
+    store.save(KEY, RECORD)
+    path = store.folder / f"{KEY}.json"
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        for bit in (1, 2, 4):  # most digits become other digits
+            path.write_bytes(whole[:place] + bytes([whole[place] ^ bit]) + whole[place + 1 :])
+            assert store.load(KEY) in (None, RECORD), (place, bit)  # 1.5e-9 and 1.5E-9 are the same
+
+
 def test_arrays_that_were_cut_off_are_none(store):
     store.save_arrays(KEY, ARRAYS)
     path = store.folder / f"{KEY}.npz"
@@ -170,6 +183,39 @@ def test_a_value_that_json_does_not_know_leaves_nothing(store):
     with pytest.raises(TypeError):
         store.save(KEY, {"bad": object()})
     assert store.load(KEY) is None
+
+
+def test_a_folder_is_for_one_at_a_time(tmp_path):
+    """Threads stand for programs."""
+    heard: queue.Queue[str] = queue.Queue()
+
+    def second():
+        with alone_in(tmp_path, lambda: heard.put("waits")):
+            heard.put("has it")
+
+    with alone_in(tmp_path, lambda: heard.put("waited for nobody")):
+        other = threading.Thread(target=second)
+        other.start()
+        assert heard.get(timeout=60) == "waits"
+        assert heard.empty()
+    assert heard.get(timeout=60) == "has it"
+    other.join(60)
+    with pytest.raises(KeyboardInterrupt), alone_in(tmp_path, heard.put):
+        raise KeyboardInterrupt
+    with alone_in(tmp_path, lambda: heard.put("waited for nobody")):
+        assert heard.empty()
+
+
+def test_where_there_are_no_locks_nobody_waits(tmp_path, monkeypatch):
+    def none(*_):
+        raise OSError(95, "Operation not supported")
+
+    monkeypatch.setattr("fcntl.flock", none)
+    with alone_in(tmp_path, pytest.fail), alone_in(tmp_path, pytest.fail):
+        pass
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    with alone_in(tmp_path, pytest.fail), alone_in(tmp_path, pytest.fail):
+        pass
 
 
 def test_clearing_takes_only_what_is_the_stores(store):

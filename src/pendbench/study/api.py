@@ -11,6 +11,7 @@ from typing import Final
 import pandas as pd
 
 from pendbench.errors import InputError
+from pendbench.files import alone_in
 from pendbench.report import write_report
 from pendbench.strict import show, shown_path
 from pendbench.study.baseline import baseline_path, read_baseline, regressions, write_baseline
@@ -81,17 +82,23 @@ def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
     where = baseline_path(find_study(request.study), quick=request.quick)
     baseline = read_baseline(where) if request.check else None
     out = _folder(request, plan)
-    store = Store(out / "work")
-    if request.fresh:
-        store.clear()
-    with LocalPool(workers) as pool:
-        results = kind(plan.options.kind).run(plan, Runner(store, pool, watcher or Silence()))
-    results = replace(results, provenance=provenance(plan, workers))
-    write_report(results, out)
+    watcher = watcher or Silence()
+    with alone_in(out, lambda: watcher.begin("waiting for another study in this folder", 1, 0)):
+        results = _run(plan, Store(out / "work"), watcher, workers, fresh=request.fresh)
+        write_report(results, out)
     if request.update_baseline:
         write_baseline(where, results.cases)
     worse = () if baseline is None else tuple(regressions(results.cases, baseline))
     return Finished(results, out, worse)
+
+
+def _run(plan: Plan, store: Store, watcher: Watcher, workers: int, *, fresh: bool) -> Results:
+    if fresh:
+        store.clear()
+    with LocalPool(workers) as pool:
+        runner = Runner(store, pool, watcher, memory_limit=plan.options.memory_limit)
+        results = kind(plan.options.kind).run(plan, runner)
+    return replace(results, provenance=provenance(plan, workers))
 
 
 def run_study(

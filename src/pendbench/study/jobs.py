@@ -1,15 +1,19 @@
 """One interface for "run these": jobs in, outcomes out as they finish, whatever became of them.
 
-The local pool runs each job in a process of its own pool, with a time limit; a job that raises, hangs or takes its
-process with it is an outcome with a status, and the others go on.
+The local pool runs each job in a process of its own pool, with a limit of time and one of memory; a job that raises,
+hangs, takes too much or takes its process with it is an outcome with a status, and the others go on.
 """
 
 from __future__ import annotations
 
 import itertools
 import multiprocessing
+import os
 import pickle
 import signal
+import sys
+import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -24,16 +28,25 @@ from pendbench.errors import InputError, describe
 
 _STOPPING_S: Final = 0.5  # how long a worker has to end by itself; it holds nothing that could be lost
 _NO_WORKERS: Final = "the worker processes died as they started; what was finished is kept"
+_GB: Final = 1e9
+_USED_UP: Final = 87  # the exit code of a worker that makes room for a new one
+_HEARD_S: Final = 0.2  # after so long the pool knows which worker has which job
+
+OUT_OF_MEMORY: Final = "out of memory"
 
 
 @dataclass(frozen=True)
 class Job:
-    """A call that can be made in another process: `function(*arguments)`, at most `time_limit` seconds."""
+    """A call that can be made in another process: `function(*arguments)`, at most `time_limit` seconds.
+
+    memory_limit: how many GB (1e9 bytes) it may take beside what its process has already; None for any number.
+    """
 
     key: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     time_limit: float
+    memory_limit: float | None = None
 
 
 @dataclass(frozen=True)
@@ -66,7 +79,8 @@ class LocalPool:
             # A worker runs the user's script again to know its functions, and the script has come here again.
             raise SystemExit('error: a script that runs a study needs the line `if __name__ == "__main__":` before it')
         CONSTS.term_timeout = _STOPPING_S
-        self._pool = ProcessPool(max_workers=self.workers, context=multiprocessing.get_context("spawn"))
+        context = multiprocessing.get_context("spawn")
+        self._pool = ProcessPool(max_workers=self.workers, context=context, initializer=_begin)
         with _deaf_to_interrupts():
             assert self._pool.active  # asking starts it
         return self
@@ -75,6 +89,7 @@ class LocalPool:
         if kind is None:
             self._pool.close()
         else:
+            _share_stopping_time(self.workers)
             self._pool.stop()
         self._pool.join()
 
@@ -85,6 +100,7 @@ class LocalPool:
         """
         queue = iter(jobs)
         running: dict[Any, Job] = {}
+        again: Counter[str] = Counter()
         room = 1 if alone else 2 * self.workers
         while True:
             for job in itertools.islice(queue, room - len(running)):
@@ -92,12 +108,17 @@ class LocalPool:
             if not running:
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:
-                yield _outcome(running.pop(future), future)
+                job = running.pop(future)
+                if _met_a_used_up_worker(future) and again[job.key] < self.workers:
+                    again[job.key] += 1
+                    running[self._schedule(job)] = job
+                else:
+                    yield _outcome(job, future)
 
     def _schedule(self, job: Job) -> Any:
         packed = pickle.dumps((job.function, job.arguments))
         try:
-            return self._pool.schedule(_call, args=(packed,), timeout=job.time_limit)
+            return self._pool.schedule(_call, args=(packed, job.memory_limit), timeout=job.time_limit)
         except RuntimeError:
             raise InputError(_NO_WORKERS) from None
 
@@ -119,20 +140,103 @@ def _deaf_to_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _call(packed: bytes) -> tuple[str, Any]:
+def _share_stopping_time(workers: int) -> None:
+    """Workers are stopped one after the other: many together should take no longer than one."""
+    from pebble import CONSTS
+
+    CONSTS.term_timeout = _STOPPING_S / workers
+
+
+# In the worker.
+
+_at_start = 0
+
+
+def _begin() -> None:
+    """What a worker does first."""
+    global _at_start  # noqa: PLW0603
+    _at_start = _held() or 0
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
+
+
+def _leave_with_parent() -> None:
+    """End this process with the one that started it: killed, that cannot end its workers."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _call(packed: bytes, memory_limit: float | None) -> tuple[str, Any]:
     """Make a call in the worker: how it ended, and what it returned, packed, or the reason in words.
 
     Only bytes and text travel back, so no value and no exception can break the way.
     """
+    limit = None if _held() is None else memory_limit
+    if limit is not None and (_held() or 0) - _at_start > limit * _GB:
+        threading.Event().wait(_HEARD_S)
+        os._exit(_USED_UP)  # what earlier jobs left behind should not be this one's burden, nor grow for ever
     try:
-        function, arguments = pickle.loads(packed)
-        return "ok", pickle.dumps(function(*arguments))
+        with _limited(limit):
+            function, arguments = pickle.loads(packed)
+            return "ok", pickle.dumps(_with_limit_named(function(*arguments), limit))
     except InputError as error:
         return "bad input", str(error)
     except MemoryError as error:
-        return "out of memory", describe(error)
+        return OUT_OF_MEMORY, describe(error) + _naming(limit)
     except BaseException as error:
         return "error", describe(error)
+
+
+def _held() -> int | None:
+    """How many bytes of writable memory this process has to itself. None where the system does not limit that."""
+    if sys.platform != "linux":
+        return None
+    try:
+        with open("/proc/self/statm", "rb") as file:
+            return int(file.read().split()[5]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return None
+
+
+@contextmanager
+def _limited(gigabytes: float | None) -> Iterator[None]:
+    """In this block, the process can take so much more memory than it has: any allocation beyond it fails.
+
+    It is writable memory that counts, not address space: compilers and libraries reserve far more of that than they
+    ever use.
+    """
+    if gigabytes is None:
+        yield
+        return
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    wanted = (_held() or 0) + int(gigabytes * _GB)
+    least = min([wanted, *(limit for limit in before if limit != resource.RLIM_INFINITY)])
+    resource.setrlimit(resource.RLIMIT_DATA, (least, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+def _with_limit_named(value: Any, limit: float | None) -> Any:
+    """The value; where it is the record of a run without enough memory, with the limit in its reason."""
+    if isinstance(value, dict) and value.get("status") == OUT_OF_MEMORY:
+        return {**value, "reason": f"{value.get('reason', '')}{_naming(limit)}"}
+    return value
+
+
+def _naming(limit: float | None) -> str:
+    return "" if limit is None else f"; the limit is {limit:g} GB"
+
+
+# What came back from it.
+
+
+def _met_a_used_up_worker(future: Any) -> bool:
+    return getattr(future.exception(), "exitcode", None) == _USED_UP
 
 
 def _outcome(job: Job, future: Any) -> Outcome:
@@ -144,7 +248,8 @@ def _outcome(job: Job, future: Any) -> Outcome:
     if isinstance(error, TimeoutError):
         return Outcome(job, fault=Fault("timed out", f"took longer than {job.time_limit:g} s"))
     if isinstance(error, ProcessExpired):
-        return Outcome(job, fault=Fault("crashed", f"the process died {_of(error.exitcode)}"))
+        limit = None if _held() is None else job.memory_limit
+        return Outcome(job, fault=Fault("crashed", f"the process died {_of(error.exitcode, limit)}"))
     if isinstance(error, BrokenProcessPool):
         raise InputError(_NO_WORKERS)
     return Outcome(job, fault=Fault("error", describe(error)))
@@ -161,8 +266,10 @@ def _returned(job: Job, status: str, content: Any) -> Outcome:
         return Outcome(job, fault=Fault("error", describe(error)))
 
 
-def _of(exitcode: int | None) -> str:
-    """What a process died of."""
-    if exitcode is not None and -exitcode in signal.valid_signals():
-        return f"of {signal.Signals(-exitcode).name}"
-    return f"with exit code {exitcode}"
+def _of(exitcode: int | None, memory_limit: float | None) -> str:
+    """What a process died of. A program that aborts where it gets no memory, or is killed by the system, cannot say."""
+    if exitcode is None or -exitcode not in signal.valid_signals():
+        return f"with exit code {exitcode}"
+    name = signal.Signals(-exitcode).name
+    perhaps = memory_limit is not None and name in {"SIGABRT", "SIGKILL"}
+    return f"of {name}" + (f", perhaps for want of memory{_naming(memory_limit)}" if perhaps else "")

@@ -44,7 +44,11 @@ class EngineTable(Table):
 
 
 class StudyFile(Table):
-    """The keys that every study file may have. A kind of study adds its own."""
+    """The keys that every study file may have. A kind of study adds its own.
+
+    time_limit, memory_limit: what each job may take, s and GB (1e9 bytes). Less than half a GB would fail good engines,
+    which compile their code.
+    """
 
     KEYS_ARE: ClassVar[str] = "key"
 
@@ -53,6 +57,7 @@ class StudyFile(Table):
     scenes: Annotated[list[str], Field(min_length=1)]
     engines: Annotated[list[EngineTable], Field(min_length=1)]
     time_limit: Annotated[float, Field(gt=0, le=86400)] = 120.0
+    memory_limit: Annotated[float, Field(ge=0.5, le=1e6, allow_inf_nan=False)] = 4.0
     quick: dict[str, Any] = {}
 
 
@@ -114,6 +119,8 @@ def load_plan(path_or_name: str | os.PathLike[str], *, quick: bool = False, engi
     scenes = tuple(_scenes(where, options.scenes, path.parent))
     tables = _selected(where, options.engines, engines)
     absent = sorted({table.name for _, table in tables if table.optional and not _installed(table.name)})
+    if absent and all(table.name in absent for _, table in tables):
+        raise InputError(f"--engines: {', '.join(absent)}: not installed, and no other engine was asked for")
     cases = tuple(_cases(scenes, [(at, table) for at, table in tables if table.name not in absent]))
     idle = {scene.name for scene in scenes} - {case.scene.name for case in cases}
     if idle and not engines:
@@ -141,6 +148,8 @@ def _installed(name: str) -> bool:
         engine(name)
     except MissingEngineError:
         return False
+    except InputError:  # an unknown name, which is no engine to leave out: said where its table is read
+        return True
     return True
 
 

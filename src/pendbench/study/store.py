@@ -39,6 +39,11 @@ def key_of(*parts: object) -> str:
     return hashlib.sha256(repr((source_digest(), *parts)).encode()).hexdigest()[:_KEY_LENGTH]
 
 
+def _hash(key: str, value: Any) -> str:
+    """By this, a digit that changed on the disk is noticed."""
+    return hashlib.sha256(json.dumps([key, value]).encode()).hexdigest()[:16]
+
+
 class Store:
     """The folder of finished work of one study."""
 
@@ -52,13 +57,14 @@ class Store:
         """What was saved under `key`, or None where there is nothing that can be read."""
         try:
             record = json.loads(self._path(key, "json").read_text("utf-8"))
+            whole = isinstance(record, dict) and record.get("hash") == _hash(key, record.get("value"))
         except (OSError, ValueError, RecursionError):
             return None
-        return record.get("value") if isinstance(record, dict) and record.get("key") == key else None
+        return record["value"] if whole else None
 
     def save(self, key: str, value: Any) -> None:
         """Save a value of JSON's types; numbers may be nan or infinite."""
-        text = json.dumps({"key": key, "value": value}).encode()
+        text = json.dumps({"key": key, "hash": _hash(key, value), "value": value}).encode()
         write_whole(self._path(key, "json"), lambda file: file.write(text))
 
     def load_arrays(self, key: str) -> dict[str, FloatArray] | None:
