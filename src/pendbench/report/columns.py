@@ -282,6 +282,21 @@ _COSTS: Final = {
     "flags": _text("flags", "what a reader should know about the row, its timing included", is_time=True),
 }
 
+_SCALING: Final = {
+    "step_per_link_ns": Column("ns", ".3g", "step per link, ns", "the cost of a step over n", is_time=True),
+    "step_exponent": Column("1", ".2f", "exponent", "p in: cost of a step ~ n^p", is_time=True),
+    "memory_mb": Column(
+        "MB", ".3g", "memory, MB", "what building and running took beside what the process had", is_time=True
+    ),
+    "longest_n": Column(
+        "1", "d", "longest chain", "the most links that run in real time with an energy error below 1 %", is_time=True
+    ),
+    "race_spent_s": Column("s", ".3g", "spent, s", "time spent stepping", is_time=True),
+    "reached_s": Column("s", ".3g", "reached, s", "how far the motion was followed", is_time=True),
+    "next_n": Column("1", "d", "next chain", "the shortest chain beyond the longest that was tried", is_time=True),
+    "outcome": _text("outcome", "held, lost (energy or rods), too slow for real time, or a status", is_time=True),
+}
+
 #: Every column by its name in the CSV files, in the order in which they are written.
 COLUMNS: Final = MappingProxyType(
     {
@@ -295,6 +310,7 @@ COLUMNS: Final = MappingProxyType(
         **_CAUSES,
         **_STABILITY,
         **_COSTS,
+        **_SCALING,
     }
 )
 

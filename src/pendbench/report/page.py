@@ -15,6 +15,7 @@ PAGES: Final = {
     "chaos": "pendbench.report.chaos",
     "cost": "pendbench.report.cost",
     "stability": "pendbench.report.stability",
+    "scaling": "pendbench.report.scaling",
 }
 
 _PLAIN: Final = "pendbench.report.plain"

@@ -104,7 +104,7 @@ def timing_trust(cases: Sequence[Row]) -> str:
         parts.append("**Most of these timings are noise: draw no conclusions from costs.** The machine was busy.")
     parts.append(
         f"{counted(len(noisy), 'of them is', 'of them are')} noisy: the machine did something else in between. Trust "
-        "these costs to the spread given and no further; for better ones run the study again with `--fresh` on an idle machine:"
+        "these costs to the spread given and no further; for better ones run it again, `--fresh`, on an idle machine:"
     )
     names = [f"- {markdown(case_name(row))}: spread {cell(row, 'step_spread')}" for row in noisy[:_LISTED]]
     if len(noisy) > _LISTED:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from functools import partial
@@ -9,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation
+from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation, State
 from pendbench.scene import Scene
 
 REPEATS = 5
@@ -131,3 +132,44 @@ def time_each_step(
         simulation.state()
         samples.append(time.perf_counter() - begun)
     return float(np.median(samples[_LOOKS // 10 :])) * 1e6
+
+
+class Race(NamedTuple):
+    """How far a run came against the clock: simulated time reached and time spent stepping, s, and whether it was lost.
+
+    lost: the state at some sample was one that `is_lost` knew, or the engine said that something was wrong.
+    """
+
+    reached: float
+    spent: float
+    lost: bool
+
+
+def race(
+    engine: Engine,
+    scene: Scene,
+    method: str,
+    dt: float | None,
+    settings: dict[str, float],
+    samples: int,
+    is_lost: Callable[[State], bool],
+) -> Race:
+    """Run the scene for its duration, or until it has taken as long, or until it is lost; only stepping is timed."""
+    simulation = engine.build(scene, method, dt, **settings)
+    total = samples if dt is None else max(1, round(scene.duration / dt))
+    marks = np.unique(np.linspace(0, total, samples + 1).round().astype(int))
+    unit = scene.duration / samples if dt is None else dt
+    spent, reached = 0.0, 0.0
+    for before, mark in itertools.pairwise(marks.tolist()):
+        begun = time.perf_counter()
+        if isinstance(simulation, Simulation):
+            simulation.advance(mark - before)
+        else:
+            simulation.advance_to(mark * unit)
+        spent += time.perf_counter() - begun
+        reached = mark * unit
+        if simulation.health() is not None or is_lost(simulation.state()):
+            return Race(reached, spent, lost=True)
+        if spent > scene.duration:
+            break
+    return Race(reached, spent, lost=False)

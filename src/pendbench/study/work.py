@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import Fault
+from pendbench.engines.protocol import Fault, State
 from pendbench.engines.registry import engine
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance, wrapped
@@ -18,11 +18,11 @@ from pendbench.recording import simulate
 from pendbench.scene import Scene
 from pendbench.study.case import Case
 from pendbench.study.causes import model_error
-from pendbench.study.clock import Timing, time_case, time_each_step
+from pendbench.study.clock import Timing, race, time_case, time_each_step
 from pendbench.study.lyapunov import lyapunov_exponent
 from pendbench.study.measure import drift, growth_rate, time_to
 from pendbench.study.store import Store
-from pendbench.study.verdict import verdict_of
+from pendbench.study.verdict import HOLDS, verdict_of
 from pendbench.trajectory import Trajectory
 from pendbench.truth import Truth, reference, solve_angles, solve_vectors
 
@@ -34,6 +34,7 @@ THRESHOLDS: Final = (1e-3, 1e-2, 1e-1)
 _CURVE_POINTS: Final = 250
 _LONG_SAMPLES: Final = 20_000
 _FREE_RUNS: Final = 10
+_RACE_SAMPLES: Final = 400
 _APART: Final = 1e-10
 _MOVED: Final = 0.1  # rad: no longer where it was
 _PULLED: Final = 1e-5  # rad/s^2: more than what an equilibrium has by rounding, or by a nudge of 1e-9 rad
@@ -195,7 +196,7 @@ def _run_freely(case: Case, times: FloatArray) -> Trajectory:
         if runs[-1].status != "ok":
             break
     ends = [runs[0].t[:1], *(run.t[1:] for run in runs)]
-    parts = {
+    parts: dict[str, Any] = {
         name: np.concatenate([getattr(runs[0], name)[:1], *(getattr(run, name)[1:] for run in runs)])
         for name in ("theta", "omega", "gap")
     }
@@ -258,6 +259,60 @@ def _stays(scene: Scene, run: Trajectory) -> float | None:
 def failed_stability(fault: Fault) -> Record:
     """The record of a run of which nothing came back."""
     return {"status": fault.status, "reason": fault.reason, "verdict": fault.status}
+
+
+def measure_step_cost(case: Case, step: float, steps: int) -> Record:
+    """What a step of the case costs, the memory it takes, and how far `steps` steps of `step` (s) are from the motion.
+
+    For a method that chooses its steps: a step of its own, over the same time.
+    """
+    import psutil
+
+    its, settings, until = engine(case.engine), dict(case.settings), step * steps
+    before = psutil.Process().memory_info().rss
+    run = simulate(case.scene, case.engine, case.method, case.dt, [until], **settings)
+    taken = psutil.Process().memory_info().rss - before
+    if run.status != "ok":
+        return failed_run(Fault(run.status, run.reason))
+    exact = simulate(case.scene, "analytic", "taylor", None, [until], tolerance=1e-13)
+    timing = time_case(its, case.scene, case.method, case.dt, settings, until)
+    error = distance(case.scene.lengths, exact.theta, run.theta - exact.theta)
+    found = energy(case.scene, run.theta, run.omega) - energy(case.scene, case.scene.angles, case.scene.rates)
+    return {
+        "status": "ok",
+        "reason": "",
+        "error_max": float(error.max()),
+        "energy_drift_max": float(np.abs(found).max()) / energy_scale(case.scene),
+        "memory_mb": max(0.0, taken / 1e6),
+        **_timing(timing, until),
+    }
+
+
+def measure_race(case: Case) -> Record:
+    """Run the case against the clock: `held` where it keeps up with it, and its energy within 1 %."""
+    scene, worst = case.scene, 0.0
+    scale, first = energy_scale(scene), float(energy(scene, scene.angles, scene.rates))
+
+    def is_lost(state: State) -> bool:
+        nonlocal worst
+        with np.errstate(over="ignore", invalid="ignore"):
+            worst = max(worst, abs(float(energy(scene, state.theta, state.omega)) - first) / scale)
+        return not (worst < HOLDS and state.gap < HOLDS)
+
+    found = race(engine(case.engine), scene, case.method, case.dt, dict(case.settings), _RACE_SAMPLES, is_lost)
+    outcome = "lost" if found.lost else "held" if found.spent <= scene.duration else "too slow"
+    reason = {
+        "lost": f"the energy, or a rod, is off by more than {HOLDS:.0%} at t = {found.reached:.3g} s",
+        "too slow": f"{found.reached:.3g} s of motion took {found.spent:.3g} s",
+        "held": "",
+    }[outcome]
+    return {
+        "outcome": outcome,
+        "reason": reason,
+        "reached_s": found.reached,
+        "spent_s": found.spent,
+        "energy_drift_max": worst,
+    }
 
 
 def failed_run(fault: Fault) -> Record:

@@ -1,0 +1,169 @@
+"""The kind of study `scaling`: its costs, its search for the longest chain in real time, its report."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from pendbench.engines.registry import engine
+from pendbench.errors import InputError
+from pendbench.physics.energy import energy_scale
+from pendbench.scene import load_scene
+from pendbench.study import scaling
+from pendbench.study.api import run_study
+from pendbench.study.clock import race
+from pendbench.study.plan import load_plan
+
+STUDY = """
+title = "Small"
+kind = "scaling"
+scenes = ["rope100"]
+links = [1, 3, 4, 6]
+fit_from = 3
+duration = 0.02
+[[engines]]
+name = "analytic"
+methods = ["rk4", "euler"]
+dt = [1e-3]
+[[engines]]
+name = "analytic"
+methods = ["taylor"]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scaling")
+    (path / "small.toml").write_text(STUDY)
+    return path
+
+
+class Oracle:
+    """A runner that answers at once: trials hold up to n and a step that falls like 1/n, and are in time up to n."""
+
+    def __init__(self, fastest, steady, stops=math.inf):
+        self.fastest, self.steady, self.stops, self.raced = fastest, steady, stops, []
+
+    def run(self, _stage, jobs, _on_fault, *, alone=False):
+        del alone
+        return {job.key: self._answer(job) for job in jobs}
+
+    def _answer(self, job):
+        if job.function is scaling.measure_step_cost:
+            n = job.arguments[0].scene.n
+            timing = {"step_us": 2.0 * n**1.5, "step_spread": 0.0, "build_s": 0.0, "first_call_s": 0.0}
+            return (
+                {"status": "ok", "reason": "", **timing} if n < self.stops else {"status": "timed out", "reason": "x"}
+            )
+        if job.function is not scaling.measure_race:
+            return {}
+        case = job.arguments[0]
+        n, dt = case.scene.n, case.dt or 0.0
+        self.raced.append((case.method, n, case.dt))
+        outcome = "lost" if dt * n > self.steady else "held" if n <= self.fastest else "too slow"
+        return {"outcome": outcome, "reason": outcome, "reached_s": 1.0, "spent_s": 1.0, "energy_drift_max": 0.0}
+
+
+def searched(folder, **oracle):
+    runner = Oracle(**oracle)
+    results = scaling.run(load_plan(folder / "small.toml"), runner)
+    return results, runner
+
+
+@pytest.mark.parametrize("fastest", [8, 100, 777, 12_345])
+def test_longest_chain_is_found_to_a_tenth(folder, fastest):
+    results, _ = searched(folder, fastest=fastest, steady=0.5)
+    for row in results.tables["longest"].to_dict("records"):
+        assert fastest / 1.1 - 1 <= row["longest_n"] <= fastest
+        assert row["longest_n"] < row["next_n"]
+        assert row["outcome"] == "too slow"
+
+
+def test_step_of_the_longest_chain_is_near_the_coarsest_that_holds(folder):
+    results, _ = searched(folder, fastest=500, steady=0.05)
+    rows = results.tables["longest"].set_index("method")
+    best = 0.05 / rows.loc["rk4", "longest_n"]
+    assert best / scaling.FINER**2 <= rows.loc["rk4", "dt"] <= best
+    assert math.isnan(rows.loc["taylor", "dt"])
+
+
+def test_nothing_is_tried_twice_and_few_trials_do(folder):
+    _, runner = searched(folder, fastest=1000, steady=0.05)
+    assert len(set(runner.raced)) == len(runner.raced)
+    assert sum(method == "rk4" for method, _, _ in runner.raced) < 40
+
+
+def test_chain_that_no_step_keeps_is_none(folder):
+    results, runner = searched(folder, fastest=1000, steady=0.0)
+    rows = results.tables["longest"].set_index("method")
+    assert math.isnan(rows.loc["rk4", "longest_n"])
+    assert rows.loc["rk4", "outcome"] == "lost"
+    assert min(dt for method, _, dt in runner.raced if method == "rk4") >= 1e-5
+
+
+def test_exponent_is_that_of_the_costs_and_the_end_is_told(folder):
+    results, _ = searched(folder, fastest=10, steady=1.0)
+    assert results.tables["growth"].step_exponent.to_numpy() == pytest.approx(1.5)
+    results, _ = searched(folder, fastest=10, steady=1.0, stops=4)
+    growth = results.tables["growth"]
+    assert set(growth.n_to) == {3}
+    assert set(growth.status) == {"timed out"}
+    assert set(results.cases[results.cases.n > 4].n) == set()
+
+
+def test_study_from_end_to_end(folder):
+    table = run_study(folder / "small.toml", folder / "out", jobs=1)
+    assert set(table.status) == {"ok"}
+    assert sorted(set(table.n)) == [1, 3, 4, 6]
+    assert (table.step_us > 0).all()
+    assert (table.error_max < 1e-6).all()
+    rk4, euler = (table[table.method == method].error_max.max() for method in ("rk4", "euler"))
+    assert rk4 < euler
+    page = (folder / "out/report.md").read_text()
+    assert "## The longest chain in real time" in page
+    assert (folder / "out/plots/cost.png").stat().st_size > 1000
+
+
+def test_pattern_keeps_its_mass_and_its_length(folder):
+    study = scaling._Scaling(load_plan(folder / "small.toml"), Oracle(1, 1.0))
+    pattern = load_scene("rope100")
+    for n in (1, 7):
+        scene = study.scene(n)
+        assert scene.masses.sum() == pytest.approx(pattern.masses.sum())
+        assert scene.lengths.sum() == pytest.approx(pattern.lengths.sum())
+        assert (scene.n, scene.duration) == (n, 0.02)
+
+
+def test_race_stops_where_the_energy_is_lost():
+    scene = load_scene("chain10")
+    analytic, asked = engine("analytic"), []
+    found = race(analytic, scene, "rk4", 0.01, {}, 100, lambda state: asked.append(state) or len(asked) == 7)
+    assert found.lost
+    assert found.reached == pytest.approx(0.7)
+    assert energy_scale(scene) > 0
+
+
+def test_race_against_a_method_that_chooses_its_steps():
+    found = race(engine("analytic"), load_scene("single"), "taylor", None, {}, 10, lambda _: False)
+    assert (found.reached, found.lost) == (10.0, False)
+    assert 0 < found.spent < 10
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (('["rope100"]', '["rope100", "chain5"]'), "scenes has 2 entries; allowed: 1"),
+        (('["rope100"]', '["heavy_tip"]'), "masses differ"),
+        (("links = [1, 3, 4, 6]", "links = []"), "links"),
+        (("links = [1, 3, 4, 6]", "links = [0]"), "links"),
+        (("duration = 0.02", "duration = 0"), "duration"),
+    ],
+)
+def test_bad_study_is_one_line(folder, change, says):
+    path = folder / "bad.toml"
+    path.write_text(STUDY.replace(*change))
+    with pytest.raises(InputError) as error:
+        load_plan(path)
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
