@@ -18,7 +18,7 @@ from systems import order
 ENGINE = AnalyticEngine()
 ACCURATE = [name for name, method in ENGINE.methods.items() if method.adaptive]
 FIXED = [name for name, method in ENGINE.methods.items() if not method.adaptive]
-REVERSIBLE = {"gauss4": 1e-12, "gauss6": 1e-12, "rattle": 1e-10}
+REVERSIBLE = {"gauss4": 1e-12, "gauss6": 1e-12, "rattle": 1e-10, "frame": 1e-10}
 
 
 def after(scene, method, dt, steps):

@@ -19,12 +19,13 @@ _TAYLOR: Final = "Taylor series, 4 orders and 0.9 for each digit of the toleranc
 
 _METHODS: Final = {
     "adaptive": Method(order=8, adaptive=True, settings=_LIMITS, note="DOP853 with compensated summation"),
-    "taylor": Method(order=17, adaptive=True, settings=_LIMITS, note=_TAYLOR),
+    "taylor": Method(order=17, adaptive=True, settings=_LIMITS, note=_TAYLOR, dense=True),
     "rk4": Method(order=4, note="the classical Runge-Kutta method"),
     "euler": Method(order=1, note="semi-implicit Euler, the method of most engines for games"),
     "gauss4": Method(order=4, note="Gauss-Legendre collocation with two stages: implicit, symplectic"),
     "gauss6": Method(order=6, note="Gauss-Legendre collocation with three stages: implicit, symplectic"),
     "rattle": Method(order=2, note="constrained Cartesian Stormer-Verlet: symplectic, for large n"),
+    "frame": Method(order=2, note="RATTLE in as many equal steps as the frame asks for: ropes at 1/240 s"),
 }
 
 
@@ -59,5 +60,7 @@ class AnalyticEngine:
                 return runs.SemiImplicitEuler(scene, dt)
             case "rattle":
                 return runs.Rattle(scene, dt)
+            case "frame":
+                return runs.Frame(scene, dt)
             case _:
                 return runs.Gauss(scene, dt, stages=self.methods[method].order // 2)

@@ -14,7 +14,7 @@ from pendbench.physics.geometry import positions, velocities
 from pendbench.physics.recursion import system_of
 from pendbench.physics.series import series_system_of
 from pendbench.scene import Scene
-from pendbench.solvers import adaptive, explicit, gauss, outcome, rattle, tableaux, taylor
+from pendbench.solvers import adaptive, explicit, frame, gauss, outcome, rattle, tableaux, taylor
 
 
 def _finite(*arrays: FloatArray) -> Fault | None:
@@ -187,52 +187,94 @@ class Gauss:
         """Whether it is finite and its stages converged."""
         if self._stuck:
             where = f"at t = {self._taken * self._dt:.6g} s"
-            return Fault("not converged", f"the stages of a step did not converge {where}; a smaller step would")
+            return Fault("not converged", f"the stages of a step did not converge {where}; a smaller step might")
         return _finite(self._q, self._rates)
+
+
+class _Ends:
+    """The rods' ends in the plane, as RATTLE moves them, and what they say of angles and rates."""
+
+    def __init__(self, scene: Scene) -> None:
+        gravity = scene.effects.gravity or 0.0
+        self.rods = rattle.Rods(scene.masses.copy(), scene.lengths.copy(), gravity, np.empty((8, scene.n)))
+        self.points = positions(scene.lengths, scene.angles)
+        self.speeds = velocities(scene.lengths, scene.angles, scene.rates)
+        self.forces = np.zeros(scene.n)
+        self._start = State(scene.angles.copy(), scene.rates.copy())
+        self.turns = np.round((scene.angles - self._directions()) / (2 * np.pi))
+
+    def _rods_now(self) -> FloatArray:
+        return np.diff(self.points, axis=0, prepend=np.zeros((1, 2)))
+
+    def _directions(self) -> FloatArray:
+        rods = self._rods_now()
+        return np.arctan2(rods[:, 0], -rods[:, 1])
+
+    def state(self, taken: int) -> State:
+        """The angles and rates after that many steps, and how far the worst rod is from its length."""
+        if taken == 0:
+            return State(self._start.theta.copy(), self._start.omega.copy())
+        theta = self._directions() + 2 * np.pi * self.turns
+        relative = np.diff(self.speeds, axis=0, prepend=np.zeros((1, 2)))
+        omega = (np.cos(theta) * relative[:, 0] + np.sin(theta) * relative[:, 1]) / self.rods.lengths
+        gap = np.abs(np.hypot(*self._rods_now().T) / self.rods.lengths - 1).max()
+        return State(theta, omega, float(gap))
 
 
 class Rattle:
     """RATTLE on the rods' ends."""
 
     def __init__(self, scene: Scene, dt: float) -> None:
-        gravity = scene.effects.gravity or 0.0
-        self._rods = rattle.Rods(scene.masses.copy(), scene.lengths.copy(), gravity, np.empty((8, scene.n)))
-        self._dt, self._taken, self._stuck = dt, 0, False
-        self._points = positions(scene.lengths, scene.angles)
-        self._speeds = velocities(scene.lengths, scene.angles, scene.rates)
-        self._forces, self._turns = np.zeros(scene.n), np.zeros(scene.n)
-        self._start = State(scene.angles.copy(), scene.rates.copy())
-        self._turns += np.round((scene.angles - self._directions()) / (2 * np.pi))
-
-    def _rods_now(self) -> FloatArray:
-        return np.diff(self._points, axis=0, prepend=np.zeros((1, 2)))
-
-    def _directions(self) -> FloatArray:
-        rods = self._rods_now()
-        return np.arctan2(rods[:, 0], -rods[:, 1])
+        self._ends, self._dt, self._taken, self._stuck = _Ends(scene), dt, 0, False
 
     def advance(self, steps: int) -> None:
         """Take `steps` steps, or as many as converge."""
         if self._stuck:
             return
-        taken = rattle.rattle(self._rods, self._dt, self._points, self._speeds, self._forces, self._turns, steps)
+        ends = self._ends
+        taken = rattle.rattle(ends.rods, self._dt, ends.points, ends.speeds, ends.forces, ends.turns, steps)
         self._taken += taken
         self._stuck = taken < steps
 
     def state(self) -> State:
         """The state now, and how far the worst rod is from its length."""
-        if self._taken == 0:
-            return State(self._start.theta.copy(), self._start.omega.copy())
-        lengths = self._rods.lengths
-        theta = self._directions() + 2 * np.pi * self._turns
-        relative = np.diff(self._speeds, axis=0, prepend=np.zeros((1, 2)))
-        omega = (np.cos(theta) * relative[:, 0] + np.sin(theta) * relative[:, 1]) / lengths
-        gap = np.abs(np.hypot(*self._rods_now().T) / lengths - 1).max()
-        return State(theta, omega, float(gap))
+        return self._ends.state(self._taken)
 
     def health(self) -> Fault | None:
         """Whether it is finite and its rods could be kept at their lengths."""
         if self._stuck:
             where = f"at t = {self._taken * self._dt:.6g} s"
-            return Fault("not converged", f"no forces keep the rods at their lengths {where}; a smaller step would")
-        return _finite(self._points, self._speeds)
+            return Fault("not converged", f"no forces keep the rods at their lengths {where}; a smaller step might")
+        return _finite(self._ends.points, self._ends.speeds)
+
+
+class Frame:
+    """RATTLE on the rods' ends, each frame in as many steps as it asks for."""
+
+    def __init__(self, scene: Scene, dt: float) -> None:
+        self._ends, self._dt, self._taken, self._stuck = _Ends(scene), dt, 0, False
+        self._substeps = 1
+
+    def advance(self, steps: int) -> None:
+        """Take `steps` frames, or as many as can be cut finely enough."""
+        if self._stuck:
+            return
+        ends = self._ends
+        progress = frame.advance(
+            ends.rods, self._dt, self._substeps, ends.points, ends.speeds, ends.forces, ends.turns, steps
+        )
+        self._substeps = progress.substeps
+        self._taken += progress.frames
+        self._stuck = progress.frames < steps
+
+    def state(self) -> State:
+        """The state now, and how far the worst rod is from its length."""
+        return self._ends.state(self._taken)
+
+    def health(self) -> Fault | None:
+        """Whether it is finite and its frames could be cut finely enough."""
+        if self._stuck:
+            where = f"at t = {self._taken * self._dt:.6g} s"
+            needs = f"the chain moves too fast for {frame.MOST_SUBSTEPS} steps in a frame"
+            return Fault("not converged", f"{needs} {where}; a shorter frame would do")
+        return _finite(self._ends.points, self._ends.speeds)
