@@ -97,19 +97,20 @@ def observed_order(dt: FloatArray, error: FloatArray, floor: float, ceiling: flo
     Each two neighbouring steps show an order, log(e1 / e2) / log(dt1 / dt2), where the coarser one's error is below
     `ceiling` (small), the finer one's above `floor` (not rounding), and it falls at all. A floor that is near bends
     orders down, terms of higher order at coarse steps bend them up; so the order is that of the finest pair that is
-    confirmed by the pair before it, or as good as the steepest. The plateau is the smallest error where finer steps did
+    confirmed by a pair beside it, or as good as the steepest. A pair that confirms may reach a tenth of the floor. The plateau is the smallest error where finer steps did
     not bring half of what that order promises, unless it is below `floor`. Where no pair shows an order, there still is
     a plateau if the finest step did not bring the error down. None where there is neither.
     """
     known = np.isfinite(error)
     by_step = np.argsort(dt[known])[::-1]
     h, e = dt[known][by_step], error[known][by_step]
-    orders = {i: _order(h, e, i) for i in range(len(h) - 1) if e[i + 1] > floor and e[i] > 0}
+    seen = {i: _order(h, e, i) for i in range(len(h) - 1) if e[i + 1] > 0.1 * floor and e[i] > 0}
+    orders = {i: order for i, order in seen.items() if e[i + 1] > floor}
     shown = {i: order for i, order in orders.items() if e[i] < ceiling and order >= _FLAT}
     if not shown:
         flat = orders.get(len(h) - 2, math.inf) < _FLAT and floor < e.min() < ceiling
         return OrderFit(math.nan, float(h[-2]), float(h[-1]), float(e.min())) if flat else None
-    last = max(i for i in shown if _confirmed(shown, i))
+    last = max(i for i in shown if _confirmed(shown, seen, i))
     order, start = shown[last], last + 1
     promised = e[start] * (h[-1] / h[start]) ** (0.5 * order)
     level = float(e[start:].min())
@@ -121,8 +122,9 @@ def _order(h: FloatArray, e: FloatArray, i: int) -> float:
     return float(np.log(e[i] / e[i + 1]) / np.log(h[i] / h[i + 1]))
 
 
-def _confirmed(orders: Mapping[int, float], i: int) -> bool:
-    return orders[i] > 0.75 * max(orders.values()) or abs(orders[i] - orders.get(i - 1, math.inf)) <= _SAME
+def _confirmed(orders: Mapping[int, float], seen: Mapping[int, float], i: int) -> bool:
+    beside = (orders.get(i - 1, math.inf), seen.get(i + 1, math.inf))
+    return orders[i] > 0.75 * max(orders.values()) or any(abs(orders[i] - other) <= _SAME for other in beside)
 
 
 class Price(NamedTuple):
@@ -142,7 +144,7 @@ def price_of(accuracy: float, step: FloatArray, error: FloatArray, run_s: FloatA
     """The price of `accuracy` from points (j,) measured at different steps; nan among the errors: a run that failed.
 
     Between two neighbouring steps of which the coarser misses the accuracy and the finer has it, by interpolation of
-    logarithms; never beyond what was measured.
+    logarithms; never beyond what was measured. A finer step that was cheaper than that is the price.
     """
     by_step = np.argsort(step)[::-1]
     h, e, cost = step[by_step], error[by_step], run_s[by_step]
@@ -156,6 +158,9 @@ def price_of(accuracy: float, step: FloatArray, error: FloatArray, run_s: FloatA
         return Price(float(cost[i]), float(h[i]), best, bound=i == 0)
     share = math.log(accuracy / e[i - 1]) / math.log(e[i] / e[i - 1])
     between = [math.exp(math.log(v[i - 1]) + share * math.log(v[i] / v[i - 1])) for v in (cost, h)]
+    cheapest = int(good[np.argmin(cost[good])])
+    if cost[cheapest] < between[0]:
+        return Price(float(cost[cheapest]), float(h[cheapest]), best, bound=False)
     return Price(between[0], between[1], best, bound=False)
 
 
