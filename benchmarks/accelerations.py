@@ -1,7 +1,8 @@
 """How fast and how exact the analytic engine is, against its targets. By hand: python benchmarks/accelerations.py
 
-Three tables in Markdown: what the accelerations of a chain cost, beside MuJoCo's in the same minute; how many digits
-they keep where masses and lengths make it hard; and what that comes to over the scenes of the study "chaos".
+Three tables in Markdown: what the accelerations of a chain cost, beside MuJoCo's and Pinocchio's in the same minute;
+how many digits they keep where masses and lengths make it hard; and what that comes to over the scenes of the study
+"chaos". Pinocchio's columns are empty where it is not installed: pip install "pendbench[pinocchio]".
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import NamedTuple
 import mujoco
 import numba
 import numpy as np
+import psutil
 from scipy.linalg import LinAlgError
 
 import pendbench as pb
@@ -38,6 +40,13 @@ sys.path.insert(0, str(ROOT / "tests"))
 from hard_chains import HARD, exact_accelerations, hard_chains, relative_error  # noqa: E402
 from scenes import chain  # noqa: E402
 
+try:
+    import pinocchio
+
+    from pendbench.engines import pinocchio as aba
+except ImportError:
+    pinocchio = None
+
 SIZES = (2, 10, 50, 100, 1000, 10_000)
 MUJOCO_UP_TO = 1000  # links; its compiler refuses 1024
 # Short samples, and many: on a busy machine most of them are then spared, and the median is theirs.
@@ -47,6 +56,7 @@ NOISY = 0.1
 
 MOST_NS_PER_LINK = 45.0
 LEAST_SPEEDUP = 10.0
+LEAST_SPEEDUP_OF_ABA, FROM_LINKS = 5.0, 50  # and 1 below that
 LARGEST_ERROR = 1e-13
 LARGEST_DRIFT = 1e-12
 LARGEST_DISTANCE = 1e-10
@@ -97,6 +107,23 @@ def mujoco_data(scene: Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = joint_values(scene.angles), joint_values(scene.rates)
     return model, data
+
+
+def aba_case(scene: Scene) -> tuple[object, ...]:
+    """The arguments of Pinocchio's ABA for the chain."""
+    model = aba.chain_model(scene)
+    values = aba.joint_values(scene.angles), aba.joint_values(scene.rates)
+    return model, model.createData(), *values, np.zeros(scene.n)
+
+
+def by_aba(arguments: tuple[object, ...]) -> Callable[[int], None]:
+    """That many calls of Pinocchio's ABA, from Python."""
+
+    def accelerate(times: int) -> None:
+        for _ in range(times):
+            pinocchio.aba(*arguments)
+
+    return accelerate
 
 
 def theirs(scene: Scene) -> Callable[[int], None]:
@@ -150,37 +177,53 @@ def moving_chain(n: int) -> Scene:
     return chain(n, angle=rng.uniform(-np.pi, np.pi, n), rate=rng.uniform(-5.0, 5.0, n), mass=rng.uniform(0.5, 2.0, n))
 
 
+def fits_pinocchio(n: int) -> bool:
+    """Whether Pinocchio is there, and its data, 32 n^3 bytes, takes less than half of the memory that is free."""
+    return pinocchio is not None and 32 * n**3 < psutil.virtual_memory().available / 2
+
+
+def cells(own: Cost, whole: Cost | None, call: Cost | None, least: float) -> list[str]:
+    """What another takes for the same, less what its call from Python costs; five cells, empty where it has none."""
+    if whole is None or call is None:
+        return [""] * 5
+    work = max(whole.call - call.call, 0.0)
+    ratio = work / own.call
+    return [f"{work * 1e6:.2f}", whole.noise, f"{ratio:.1f}", f"{least:g}", verdict(ratio, least=least)]
+
+
+def speed_row(n: int) -> list[str]:
+    """Cost of the accelerations of one chain."""
+    scene, candidates = moving_chain(n), {}
+    candidates["own"] = ours(scene)
+    if n <= MUJOCO_UP_TO:
+        candidates |= {"mujoco": theirs(scene), "a call of it": nothing(scene)}
+    if fits_pinocchio(n):
+        empty = pinocchio.Model()
+        candidates["aba"] = by_aba(aba_case(scene))
+        candidates["a call of that"] = by_aba((empty, empty.createData(), *[np.zeros(0)] * 3))
+    found = dict(zip(candidates, costs(*candidates.values()), strict=True))
+    own = found["own"]
+    link = own.call * 1e9 / n
+    return [
+        str(n),
+        f"{own.call * 1e6:.3f}",
+        f"{link:.1f}",
+        f"{MOST_NS_PER_LINK:g}",
+        own.noise,
+        verdict(link, most=MOST_NS_PER_LINK),
+        *cells(own, found.get("mujoco"), found.get("a call of it"), LEAST_SPEEDUP),
+        *cells(own, found.get("aba"), found.get("a call of that"), LEAST_SPEEDUP_OF_ABA if n >= FROM_LINKS else 1.0),
+    ]
+
+
 def speed_table() -> None:
     """Cost of the accelerations."""
-    rows = []
-    for n in SIZES:
-        scene = moving_chain(n)
-        if n > MUJOCO_UP_TO:
-            [own] = costs(ours(scene))
-            beside = ["", "", "", ""]
-        else:
-            own, other, call = costs(ours(scene), theirs(scene), nothing(scene))
-            work = max(other.call - call.call, 0.0)
-            ratio = work / own.call
-            beside = [f"{work * 1e6:.2f}", other.noise, f"{ratio:.1f}", verdict(ratio, least=LEAST_SPEEDUP)]
-        link = own.call * 1e9 / n
-        rows.append(
-            [
-                str(n),
-                f"{own.call * 1e6:.3f}",
-                f"{link:.1f}",
-                f"{MOST_NS_PER_LINK:g}",
-                own.noise,
-                verdict(link, most=MOST_NS_PER_LINK),
-                *beside[:3],
-                f"{LEAST_SPEEDUP:g}" if beside[0] else "",
-                beside[3],
-            ]
-        )
     print(f"### Cost of the accelerations (time of one thread, medians of {REPEATS} samples, in turn)\n")
     heads = ["n", "us", "ns per link", "at most", "spread", "verdict"]
-    table([*heads, "MuJoCo, us", "spread", "ratio", "at least", "verdict"], rows)
-    print("MuJoCo: mj_forward, all that the chain does not call for disabled, less what a call from Python costs.\n")
+    beside = ["spread", "ratio", "at least", "verdict"]
+    table([*heads, "MuJoCo, us", *beside, "Pinocchio, us", *beside], [speed_row(n) for n in SIZES])
+    print("MuJoCo: mj_forward, all that the chain does not call for disabled, less what a call from Python costs.")
+    print("Pinocchio: aba, less what a call for a model without joints costs; its data takes 32 n^3 bytes.\n")
 
 
 def mujoco_accelerations(scene: Scene) -> FloatArray:
@@ -189,6 +232,12 @@ def mujoco_accelerations(scene: Scene) -> FloatArray:
         model, data = mujoco_data(scene)
         mujoco.mj_forward(model, data)
     found: FloatArray = np.cumsum(data.qacc)
+    return found
+
+
+def aba_accelerations(scene: Scene) -> FloatArray:
+    """The rods' angular accelerations (n,) as Pinocchio's ABA has them."""
+    found: FloatArray = np.cumsum(pinocchio.aba(*aba_case(scene)))
     return found
 
 
@@ -214,6 +263,7 @@ def error_table(seeds: int) -> None:
         with np.errstate(all="ignore"):
             cholesky, _ = worst_error(lambda s: dense.accelerations(s, s.angles, s.rates), cases)
             other, _ = worst_error(mujoco_accelerations, cases)
+            by_joints = f"{worst_error(aba_accelerations, cases)[0]:.1e}" if pinocchio else ""
         rows.append(
             [
                 kind,
@@ -223,10 +273,11 @@ def error_table(seeds: int) -> None:
                 verdict(worst, most=LARGEST_ERROR),
                 f"{cholesky:.1e}",
                 f"{other:.1e}",
+                by_joints,
             ]
         )
     print(f"### Relative error against 50 digits ({len(cases)} states each, n = 5 to 20; largest component)\n")
-    table(["masses and shape", "worst", "median", "at most", "verdict", "dense Cholesky", "MuJoCo"], rows)
+    table(["masses and shape", "worst", "median", "at most", "verdict", "dense Cholesky", "MuJoCo", "Pinocchio"], rows)
 
 
 def scene_table() -> None:
@@ -283,6 +334,7 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, default=100, help="states of each kind and size (default: %(default)s)")
     seeds = parser.parse_args(argv).seeds
     versions = f"pendbench {pb.__version__}, numba {numba.__version__}, MuJoCo {mujoco.__version__}"
+    versions += f", Pinocchio {pinocchio.__version__}" if pinocchio else ""
     print(f"{versions}, Python {platform.python_version()}, {platform.machine()}, {os.cpu_count()} processors", end="")
     print(f", load {os.getloadavg()[0]:.1f}\n" if hasattr(os, "getloadavg") else "\n")
     speed_table()

@@ -74,12 +74,6 @@ def test_a_failed_step_is_no_point_to_start_from():
     assert price_of(2.6e-3, steps, errors, costs) == Price(20.0, 0.05, 1e-4, bound=False)
 
 
-def test_a_finer_step_that_was_cheaper_is_the_price():
-    steps, errors = np.array([0.1, 0.05, 0.02]), np.array([1e-2, 1e-4, 1e-5])
-    assert price_of(1e-3, steps, errors, np.array([10.0, 30.0, 12.0])) == Price(12.0, 0.02, 1e-5, bound=False)
-    assert price_of(1e-3, steps, errors, np.array([10.0, 30.0, 60.0])).run_s == pytest.approx(math.sqrt(300.0))
-
-
 def test_an_error_of_nothing_cannot_be_interpolated_to():
     assert price_of(1e-3, STEPS, np.array([0.1, 0.0, 0.0, 0.0]), 1 / STEPS) == Price(20.0, 0.05, 0.0, bound=False)
 

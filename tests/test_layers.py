@@ -36,6 +36,7 @@ ONLY = {
     # An adapter translates.
     "engines.mujoco": {"arrays", "engines.mjcf", "engines.protocol", "scene", "trajectory"},
     "engines.pymunk": {"arrays", "engines.protocol", "scene", "trajectory"},
+    "engines.pinocchio": {"arrays", "engines.protocol", "scene", "trajectory"},
     "engines.analytic": {
         "arrays",
         "engines.analytic_runs",
@@ -56,6 +57,8 @@ ONLY = {
 RESERVED = {
     "mujoco": {"engines.mujoco", "engines.mjcf"},
     "pymunk": {"engines.pymunk"},
+    "heyoka": {"engines.heyoka"},
+    "pinocchio": {"engines.pinocchio"},
     "matplotlib": {"report"},
     "pebble": {"study.jobs"},
     "time": {"study.clock"},
@@ -140,7 +143,7 @@ def test_each_library_has_its_place(module):
         assert not libraries(MODULES[module]) & IMPURE
 
 
-@pytest.mark.parametrize("engine", ["mujoco", "pymunk", "analytic"])
+@pytest.mark.parametrize("engine", ["mujoco", "pymunk", "analytic", "heyoka", "pinocchio"])
 def test_an_adapter_imports_its_own_library_and_numpy(engine):
     foreign = libraries(MODULES[f"engines.{engine}"]) - set(sys.stdlib_module_names)
     assert foreign <= {"numpy", engine}

@@ -189,10 +189,10 @@ def test_a_coarse_pair_that_terms_of_higher_order_bend_up_does_not_show_the_orde
 
 
 def test_a_pair_is_confirmed_by_the_finer_one_even_below_the_floor():
-    steps = [2e-3, 1e-3, 5e-4, 2e-4, 1e-4]
-    found = fit(steps, [1.4e-4, 3.9e-7, 4.1e-9, 1.7e-11, 2.7e-13])  # 8.5, 6.5, 6.0, 6.0
+    steps, errors = [2e-3, 1e-3, 5e-4, 2e-4, 1e-4], [1.4e-4, 3.9e-7, 4.1e-9, 1.7e-11, 2.7e-13]
+    found = observed_order(np.array(steps), np.array(errors), 1e-12, 0.03)  # 8.5, 6.6, 6.0, 6.0
     assert found.order == pytest.approx(6.0, abs=0.1)
-    assert found.coarse == 5e-4
+    assert (found.coarse, found.fine) == (5e-4, 2e-4)
 
 
 def test_saturated_coarse_steps_are_left_out():

@@ -24,10 +24,11 @@ _BUNDLED: Final = {
     "analytic": ("pendbench.engines.analytic:AnalyticEngine", "pendbench"),
     "heyoka": ("pendbench.engines.heyoka:HeyokaEngine", "pendbench"),
     "mujoco": ("pendbench.engines.mujoco:MujocoEngine", "mujoco-core"),
+    "pinocchio": ("pendbench.engines.pinocchio:PinocchioEngine", "pendbench"),
     "pymunk": ("pendbench.engines.pymunk:PymunkEngine", "pymunk"),
 }
 # Those whose program comes with an extra of that package, of the same name.
-_EXTRAS: Final = frozenset({"heyoka"})
+_EXTRAS: Final = frozenset({"heyoka", "pinocchio"})
 _registered: dict[str, Factory] = {}
 
 

@@ -144,7 +144,7 @@ def price_of(accuracy: float, step: FloatArray, error: FloatArray, run_s: FloatA
     """The price of `accuracy` from points (j,) measured at different steps; nan among the errors: a run that failed.
 
     Between two neighbouring steps of which the coarser misses the accuracy and the finer has it, by interpolation of
-    logarithms; never beyond what was measured. A finer step that was cheaper than that is the price.
+    logarithms; never beyond what was measured. Which step that is does not depend on the clock.
     """
     by_step = np.argsort(step)[::-1]
     h, e, cost = step[by_step], error[by_step], run_s[by_step]
@@ -158,9 +158,6 @@ def price_of(accuracy: float, step: FloatArray, error: FloatArray, run_s: FloatA
         return Price(float(cost[i]), float(h[i]), best, bound=i == 0)
     share = math.log(accuracy / e[i - 1]) / math.log(e[i] / e[i - 1])
     between = [math.exp(math.log(v[i - 1]) + share * math.log(v[i] / v[i - 1])) for v in (cost, h)]
-    cheapest = int(good[np.argmin(cost[good])])
-    if cost[cheapest] < between[0]:
-        return Price(float(cost[cheapest]), float(h[cheapest]), best, bound=False)
     return Price(between[0], between[1], best, bound=False)
 
 
