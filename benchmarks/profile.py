@@ -1,0 +1,126 @@
+"""Where the time of the accelerations goes, and what many chains at once cost. By hand: python benchmarks/profile.py
+
+Two tables in Markdown. The first takes one chain's recursion apart: sines and cosines of the bends, the elimination
+inwards, the tensions outwards. The second runs many chains in vector registers, on one thread and on two.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from statistics import median
+from typing import Any, Final
+
+import numpy as np
+
+from pendbench.compiled import compiled_for_threads
+from pendbench.physics.many import many_system_of, write_accelerations_of_many
+from pendbench.physics.recursion import inwards, system_of, write_accelerations
+from pendbench.physics.trigonometry import write_bends
+from pendbench.scene import Effects, Scene
+
+SIZES: Final = (2, 10, 100, 1000, 10_000, 100_000)
+MANY: Final = (2, 10, 100)
+LANES: Final = 64
+REPEATS: Final = 15
+SAMPLE_LINKS: Final = 1_000_000  # in one sample
+
+
+@compiled_for_threads
+def bends(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:  # noqa: ARG001
+    """Sines and cosines alone."""
+    for _ in range(times):
+        write_bends(theta, system.scratch, 3, 2)
+        theta[0] += 1e-12
+
+
+@compiled_for_threads
+def elimination(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:
+    """Sines and cosines, and the way inwards."""
+    for _ in range(times):
+        alpha, beta = inwards(system, theta, omega)
+        out[0] = alpha + beta
+        theta[0] += 1e-12
+
+
+@compiled_for_threads
+def whole(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:
+    """All of it."""
+    for _ in range(times):
+        write_accelerations(system, theta, omega, out)
+        theta[0] += 1e-12
+
+
+@compiled_for_threads
+def side_by_side(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:
+    """Many chains at once."""
+    for _ in range(times):
+        write_accelerations_of_many(system, theta, omega, out)
+        theta[0, 0] += 1e-12
+
+
+def chain(n: int) -> Scene:
+    """One metre of bent chain in motion."""
+    each = np.full(n, 1.0 / n)
+    return Scene("chain", "", 1.0, each, each, np.linspace(0.0, 2.0, n), np.ones(n), Effects(gravity=9.81))
+
+
+def per_link(call: Callable[[int], None], links: int) -> float:
+    """The median time, ns, for each link of a call that is told how often to repeat itself."""
+    times = max(1, SAMPLE_LINKS // links)
+    call(1)
+    samples = []
+    for _ in range(REPEATS):
+        begun = time.perf_counter()
+        call(times)
+        samples.append((time.perf_counter() - begun) / times / links)
+    return 1e9 * median(samples)
+
+
+def phases(n: int) -> list[float]:
+    """For each link, ns: bends, the rest of the way inwards, the way outwards, all."""
+    scene = chain(n)
+    arguments = (system_of(scene), scene.angles.copy(), scene.rates.copy(), np.zeros(n))
+    first, second, third = (per_link(lambda times, f=f: f(*arguments, times), n) for f in (bends, elimination, whole))
+    return [first, second - first, third - second, third]
+
+
+def many(n: int) -> tuple[float, float]:
+    """For each link and chain, ns, on one thread, and how many times as much two threads do."""
+    scene, rng = chain(n), np.random.default_rng(1)
+
+    def arguments() -> tuple[Any, ...]:
+        theta, omega = rng.uniform(-3, 3, (n, LANES)), rng.uniform(-3, 3, (n, LANES))
+        return many_system_of(scene, LANES), theta, omega, np.zeros((n, LANES))
+
+    mine = [arguments(), arguments()]
+    one = per_link(lambda times: side_by_side(*mine[0], times), n * LANES)
+    with ThreadPoolExecutor(2) as pool:
+
+        def both(times: int) -> None:
+            list(pool.map(lambda each: side_by_side(*each, times), mine))
+
+        two = per_link(both, n * LANES)
+    return one, 2.0 * one / two
+
+
+def main() -> None:
+    """Print the tables."""
+    print(f"{os.cpu_count()} processors; load {os.getloadavg()[0]:.1f}; ns for each link, medians of {REPEATS}.\n")
+    print(
+        "| n | sines and cosines | elimination inwards | tensions outwards | all |\n| ---: | ---: | ---: | ---: | ---: |"
+    )
+    for n in SIZES:
+        print(f"| {n} | " + " | ".join(f"{value:.2f}" for value in phases(n)) + " |", flush=True)
+    print(
+        f"\n{LANES} chains side by side:\n\n| n | ns for each link and chain | two threads do |\n| ---: | ---: | ---: |"
+    )
+    for n in MANY:
+        cost, gain = many(n)
+        print(f"| {n} | {cost:.2f} | {gain:.2f} times as much |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
