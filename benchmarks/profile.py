@@ -109,9 +109,7 @@ def many(n: int) -> tuple[float, float]:
 def main() -> None:
     """Print the tables."""
     print(f"{os.cpu_count()} processors; load {os.getloadavg()[0]:.1f}; ns for each link, medians of {REPEATS}.\n")
-    print(
-        "| n | sines and cosines | elimination inwards | tensions outwards | all |\n| ---: | ---: | ---: | ---: | ---: |"
-    )
+    print("| n | sines and cosines | inwards | outwards | all |\n| ---: | ---: | ---: | ---: | ---: |")
     for n in SIZES:
         print(f"| {n} | " + " | ".join(f"{value:.2f}" for value in phases(n)) + " |", flush=True)
     print(
