@@ -25,7 +25,7 @@ _METHODS: Final = {
     "gauss4": Method(order=4, note="Gauss-Legendre collocation with two stages: implicit, symplectic"),
     "gauss6": Method(order=6, note="Gauss-Legendre collocation with three stages: implicit, symplectic"),
     "rattle": Method(order=2, note="constrained Cartesian Stormer-Verlet: symplectic, for large n"),
-    "frame": Method(order=2, note="RATTLE in as many equal steps as the frame asks for: ropes at 1/240 s"),
+    "frame": Method(order=2, substeps=True, note="RATTLE in as many equal steps as the frame asks for"),
 }
 
 

@@ -41,7 +41,8 @@ class Method:
     """One way an engine advances time.
 
     order: the order of convergence it claims. adaptive: it chooses its own steps and is built with dt None. dense: its
-    steps give every state on the way, so several times can fall into one. note: one line for the documentation.
+    steps give every state on the way, so several times can fall into one. substeps: it divides its step as it sees fit.
+    note: one line for the documentation.
     """
 
     order: int
@@ -49,6 +50,7 @@ class Method:
     settings: Mapping[str, Setting] = field(default_factory=dict)
     note: str = ""
     dense: bool = False
+    substeps: bool = False
 
     def with_defaults(self, given: Mapping[str, float]) -> dict[str, float]:
         """The settings `given`, and the defaults of those that are not; one without either is left out."""

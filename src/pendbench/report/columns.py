@@ -223,6 +223,14 @@ _STABILITY: Final = {
     "stable_dt": Column(
         "s", ".2g", "largest stable step, s", "the largest step that holds, of those tried: known to a tenth"
     ),
+    "unbroken_dt": Column(
+        "s",
+        ".2g",
+        "largest unbroken step, s",
+        "the largest step, of those tried, that holds or drifts, but does not break",
+    ),
+    "unsettled": _text("unsettled", "whether no step holds, but finer ones took too long to tell"),
+    "substeps": _text("substeps", "whether the method divides its step as it sees fit"),
     "stable_dt_ratio": Column(
         "1", ".2g", "of the best", "the largest stable step over that of the scene's best method"
     ),
@@ -297,6 +305,58 @@ _SCALING: Final = {
     "outcome": _text("outcome", "held, lost (energy or rods), too slow for real time, or a status", is_time=True),
 }
 
+_ENSEMBLE: Final = {
+    "chains": Column("1", "d", "chains", "how many chains were run"),
+    "pixels": Column("1", "d", "pixels", "how many pixels of the map are compared (in maps.csv: it has)"),
+    "pixels_failed": Column("1", "d", "failed", "pixels whose flip time is not known, for a run failed"),
+    "pixels_at_edge": Column(
+        "1",
+        "d",
+        "at the edge",
+        "those of them at the map's edge, where a neighbour's flip time differs by more than is allowed",
+    ),
+    "changed": Column(
+        "1",
+        "d",
+        "different",
+        "pixels whose flip time differs by more than is allowed from that of the finest tolerance",
+    ),
+    "changed_away": Column("1", "d", "away from the edge", "those of the different pixels away from the map's edge"),
+    "changed_from_map": Column(
+        "1", "d", "not as the map", "pixels whose flip time differs from the map's, which has errors of its own"
+    ),
+    "largest_away_s": Column(
+        "s", ".1e", "largest away, s", "the largest difference of flip times at pixels away from the map's edge"
+    ),
+    "chain_us": Column("us", ".3g", "chain, µs", "run_s over chains: what a chain costs one thread", is_time=True),
+    "theta1_rad": Column("rad", ".4g", "θ1, rad", "the first angle at release"),
+    "theta2_rad": Column("rad", ".4g", "θ2, rad", "the second angle at release"),
+    "flip_s": Column("s", ".4g", "flips at, s", "when a rod first goes over the top; infinite where none does"),
+    "expected_flip_s": Column(
+        "s", ".4g", "expected, s", "the flip time that it is compared with: that of the finest tolerance"
+    ),
+    "is_at_edge": _text("at the edge", "whether the pixel is at the map's edge"),
+    "is_changed": _text("different", "whether the flip time differs from the expected one by more than is allowed"),
+    "never_share": Column("1", ".1%", "never", "the share of the map's chains that do not flip within the duration"),
+    "barred_share": Column("1", ".1%", "cannot", "the share with less energy than the lowest state with a rod upright"),
+    "barred_flips": Column("1", "d", "yet do", "how many of these flip all the same"),
+    "mirror_largest_s": Column(
+        "s", ".1e", "mirror, s", "the largest difference between the map and that of the mirrored chains"
+    ),
+    "energy_from": Column("1", ".2g", "energy from", "the lowest energy share of these starts"),
+    "energy_to": Column("1", ".2g", "to", "the energy share that they do not reach"),
+    "energy_share": Column("1", ".3g", "energy", "the energy at release: 0 for the hanging chain, 1 for the upright"),
+    "exponent_first_quartile_per_s": Column(
+        "1/s", ".3g", "exponent, first quartile, 1/s", "a quarter of these starts has a smaller Lyapunov exponent"
+    ),
+    "exponent_median_per_s": Column("1/s", ".3g", "median, 1/s", "half of these starts have a smaller one"),
+    "exponent_third_quartile_per_s": Column(
+        "1/s", ".3g", "third quartile, 1/s", "three quarters of these starts have a smaller one"
+    ),
+    "regular_share": Column("1", ".0%", "regular", "the share of these starts whose motion is regular"),
+    "is_regular": _text("regular", "whether the exponent cannot be told from regular motion"),
+}
+
 #: Every column by its name in the CSV files, in the order in which they are written.
 COLUMNS: Final = MappingProxyType(
     {
@@ -311,6 +371,7 @@ COLUMNS: Final = MappingProxyType(
         **_STABILITY,
         **_COSTS,
         **_SCALING,
+        **_ENSEMBLE,
     }
 )
 

@@ -12,8 +12,8 @@ from pendbench.report.look import Look
 from pendbench.report.plots import Picture, draw
 from pendbench.report.rows import Row, distinct, number, of, records, word
 from pendbench.report.stability_answer import answer, exponents, held, is_adaptive
-from pendbench.report.stability_map import cell_text, growth_figure, map_figure, pair_name, pairs
-from pendbench.report.text import counted, listed, markdown, table
+from pendbench.report.stability_map import cell_text, growth_figure, is_true, map_figure, pair_name, pairs
+from pendbench.report.text import listed, markdown, table
 from pendbench.study.results import Results
 from pendbench.study.verdict import BREAKS, HOLDS, VERDICTS
 
@@ -32,17 +32,23 @@ _GROWTH: Final = (
 
 _MAP: Final = """\
 Each cell is coloured by the best verdict of all steps that were tried, and holds the largest step with that verdict
-"holds". "≥": no larger step was tried that could have failed. "its own": the method chooses its steps."""
+"holds". "≥": no larger step was tried that could have failed. "its own": the method chooses its steps. "?": no step
+that was tried holds, but finer ones took longer than the study allows: this is the clock's verdict, not the method's.
+`frame` divides its step as it sees fit, so its steps are not compared with the others'."""
 _STEPS: Final = """\
 The largest step with which a method holds each scene, and in brackets how many times smaller it is than that of the
-scene's best method (bold). A word stands for the best verdict where no step holds."""
+scene's best method (bold). A word stands for the best verdict where no step holds. To hold is to keep the energy to
+1 %: a method of order 1 needs small steps for that long before it breaks, and the largest step that does not break is
+in `stable_steps.csv` (`unbroken_dt`). Energy hardly sees a light link behind heavy ones: in the graded and alternating
+chains a step may hold while the tip's motion is wrong. What a step does for accuracy, the study `cost` says."""
 _STIFF: Final = """\
 A method with a fixed step is stable for an oscillation of frequency w as long as step times w stays below its limit:
 2.8 for RK4 on the imaginary axis, 2 for semi-implicit Euler and RATTLE (Stormer-Verlet); collocation has none, but its
 iteration has to converge. The fastest small oscillation of each hanging chain is known. Where the largest stable step
 times that frequency is near the limit, stiffness is what limits the step; far below it, something else is: the whip's
 crack, whose tension makes the chain stiffer than it is at rest, or an error that adds up before anything breaks."""
-_MOST_SCENES: Final = 6
+#: Verdicts whose reasons are the same in many scenes.
+_TELLING: Final = ("refused", "crashed", "error")
 
 
 def pictures(results: Results) -> Iterator[Picture]:
@@ -111,6 +117,8 @@ def _step(row: Row | None) -> str:
     if row is None:
         return ""
     text, ratio = markdown(cell_text(row)), number(row, "stable_dt_ratio")
+    if is_true(row, "substeps"):
+        return text
     if ratio > 0.999:
         return f"**{text}**"
     return f"{text} ({markdown(times_text(1 / ratio))})" if ratio > 0 else text
@@ -119,7 +127,7 @@ def _step(row: Row | None) -> str:
 def _limits(steps: Sequence[Row]) -> str:
     """Step times stiffest frequency, for each method over the scenes that it holds."""
     lines = []
-    for name in pairs([row for row in steps if not is_adaptive(row)]):
+    for name in pairs([row for row in steps if not is_adaptive(row) and not is_true(row, "substeps")]):
         own = held([row for row in steps if pair_name(row) == name])
         found = sorted((number(row, "stable_dt_stiffest"), word(row, "scene")) for row in own)
         found = [(value, scene) for value, scene in found if value > 0]
@@ -128,21 +136,38 @@ def _limits(steps: Sequence[Row]) -> str:
             ends = [
                 f"{shown('stable_dt_stiffest', value)} ({markdown(scene)})" for value, scene in (found[0], found[-1])
             ]
-            lines.append([markdown(name), str(len(found)), shown("stable_dt_stiffest", middle), *ends])
-    return table(["method", "scenes held", "step times frequency, median", "smallest", "largest"], lines, (1, 2))
+            room = sorted(number(row, "unbroken_dt") / number(row, "stable_dt") for row in own)
+            cells = [
+                str(len(found)),
+                shown("stable_dt_stiffest", middle),
+                *ends,
+                markdown(times_text(room[len(room) // 2])),
+            ]
+            lines.append([markdown(name), *cells])
+    headings = [
+        "method",
+        "scenes held",
+        "step times frequency, median",
+        "smallest",
+        "largest",
+        "breaks only above, median",
+    ]
+    return table(headings, lines, (1, 2))
 
 
 def _reasons(steps: Sequence[Row]) -> Iterator[str]:
     """For each method, what it never holds and how that ends."""
     for name in pairs(steps):
-        lost = [row for row in steps if pair_name(row) == name and word(row, "best_verdict") != "holds"]
-        groups: dict[tuple[str, str], list[str]] = {}
-        for row in lost:
-            groups.setdefault((word(row, "best_verdict"), word(row, "reason")), []).append(word(row, "scene"))
-        told = [f"{verdict} in {listed(own)} ({reason})" for (verdict, reason), own in groups.items()]
-        if told:
-            rest = f"; and {counted(len(told) - _MOST_SCENES, 'more')}" if len(told) > _MOST_SCENES else ""
-            yield f"{name}: {'; '.join(told[:_MOST_SCENES])}{rest}"
+        groups: dict[str, list[str]] = {}
+        for row in steps:
+            verdict = word(row, "best_verdict")
+            if pair_name(row) == name and verdict != "holds":
+                why = f"{verdict} ({word(row, 'reason')})" if verdict in _TELLING else verdict
+                groups.setdefault("not settled in time" if is_true(row, "unsettled") else why, []).append(
+                    word(row, "scene")
+                )
+        if groups:
+            yield f"{name}: {'; '.join(f'{verdict} in {listed(own)}' for verdict, own in groups.items())}"
 
 
 def _staying(cases: Sequence[Row]) -> Iterator[str]:
@@ -153,9 +178,9 @@ def _staying(cases: Sequence[Row]) -> Iterator[str]:
     yield "## How long what stands stays"
     yield (
         "Chains released at rest where nothing pulls them. Pi is no floating-point number: an angle of pi in a file is "
-        "1.2e-16 rad off, and every upright chain grows that by a factor of e in at most 1 / (its stiffest frequency). "
-        "So a chain that stands longer than its double-precision neighbours does so by luck or by symmetry, not merit. "
-        "The finest step that holds of each method:"
+        "1.2e-16 rad off, and an upright chain grows that, by a factor of e in 1 / (its stiffest frequency) seconds "
+        "at the fastest. A chain that stands longer than its neighbours does so by luck or by symmetry, not by merit. "
+        '"≥": it stood to the end of the run. The finest step that holds of each method:'
     )
     names = pairs(standing)
     lines = []
@@ -167,18 +192,21 @@ def _staying(cases: Sequence[Row]) -> Iterator[str]:
 
 def _stay(rows: Sequence[Row]) -> str:
     finest = min(rows, key=lambda row: number(row, "dt"), default=None)
-    return "" if finest is None else f"{shown('stays_s', finest.get('stays_s'))} s"
+    if finest is None:
+        return ""
+    stood = number(finest, "stays_s") > 0.999 * number(finest, "duration_s")
+    return f"{'≥ ' if stood else ''}{shown('stays_s', finest.get('stays_s'))} s"
 
 
 def _judged(options: Mapping[str, Any]) -> str:
     meanings = "\n".join(f"- **{name}**: {markdown(meaning, 300)}" for name, meaning in VERDICTS.items())
-    limit = number_text(float(options.get("time_limit", 0.0)), ".3g")
+    limit, finest = (number_text(float(options.get(name, 0.0)), ".3g") for name in ("time_limit", "finest"))
     return (
         f"Energy errors are in units of the energy scale; the limits are {number_text(HOLDS, '.0%')} and "
-        f"{number_text(BREAKS, '.0%')} of it. They are looked at at the samples, up to a thousand in a run. No run may "
-        f"take longer than {limit} s. A step that is not finished in that time spares the method the finer ones. The "
-        "largest stable step is searched for between the finest step that does not hold and the coarsest that does, "
-        "halving on a logarithmic scale until it is known to a tenth; below the finest step of the study it goes on in "
-        "fifths. That a step holds does not say that every smaller one does: rounding and chaos have a word too.\n\n"
+        f"{number_text(BREAKS, '.0%')} of it. They are looked at after every step, or at 1000 to 10,000 samples of "
+        f"longer runs. No run may take longer than {limit} s. A step that is not finished in that time spares the method "
+        "the finer ones. The search goes between the largest step that holds and the smallest failing one above it, "
+        "halving on a logarithmic scale until it is known to a tenth; where none holds, it goes on in fifths down to "
+        f"{finest} s. That a step holds does not say that every smaller one does: rounding and chaos have a word too.\n\n"
         f"{meanings}"
     )

@@ -8,7 +8,7 @@ from typing import Final
 
 from pendbench.report.columns import number_text, shown, times_text
 from pendbench.report.rows import Row, distinct, number, of, records, word
-from pendbench.report.stability_map import pair_name, pairs
+from pendbench.report.stability_map import is_true, pair_name, pairs
 from pendbench.report.text import counted, listed
 from pendbench.study.results import Results
 
@@ -20,8 +20,9 @@ def answer(results: Results) -> str:
     """Who holds everything; what each engine holds with a fixed step; and how much larger the best one's steps are."""
     steps, cases = records(results.tables.get("stable_steps")), records(results.cases)
     scenes = distinct(steps, "scene")
-    parts = [_adaptive(steps, scenes), *(_fixed(of(steps, engine=name), name) for name in distinct(steps, "engine"))]
-    parts += [_steps(steps), _frame(cases)]
+    plain = [row for row in steps if not is_true(row, "substeps")]
+    parts = [_adaptive(steps, scenes), *(_fixed(of(plain, engine=name), name) for name in distinct(plain, "engine"))]
+    parts += [_steps(plain), _frame(cases)]
     return " ".join(part for part in parts if part)
 
 
@@ -32,7 +33,7 @@ def held(rows: Sequence[Row]) -> list[Row]:
 
 def is_adaptive(row: Row) -> bool:
     """Whether a method chooses its own steps."""
-    return row.get("adaptive") in (True, "true")
+    return is_true(row, "adaptive")
 
 
 def _adaptive(steps: Sequence[Row], scenes: Sequence[str]) -> str:
@@ -54,18 +55,25 @@ def _fixed(rows: Sequence[Row], engine: str) -> str:
     counts = {name: len(held([row for row in fixed if pair_name(row) == name])) for name in pairs(fixed)}
     best = max(counts, key=lambda name: counts[name])
     own = [row for row in fixed if pair_name(row) == best]
-    never = [row for row in own if word(row, "best_verdict") not in ("holds", "refused")]
+    never = [row for row in own if word(row, "best_verdict") not in ("holds", "refused") and not _is_open(row)]
+    unsettled = [word(row, "scene") for row in own if _is_open(row)]
     refused = [word(row, "scene") for row in own if word(row, "best_verdict") == "refused"]
     text = f"With a fixed step, {best} is the best of {engine}: some step holds {counts[best]} of {len(own)}"
     if never:
         text += f"; none holds {listed([word(row, 'scene') for row in never])}"
+    if unsettled:
+        text += f"; not settled, since finer steps took too long, are {listed(unsettled)}"
     if refused:
         text += f"; it refuses {listed(refused)}"
     return f"{text}."
 
 
+def _is_open(row: Row) -> bool:
+    return is_true(row, "unsettled")
+
+
 def _steps(steps: Sequence[Row]) -> str:
-    """How much larger the steps of each engine's best method may be than those of the others' best."""
+    """How much larger the steps that hold may be with one engine's best method than with the others' best."""
     best: dict[str, dict[str, float]] = {}
     for row in steps:
         dt = number(row, "stable_dt")
@@ -81,7 +89,7 @@ def _steps(steps: Sequence[Row]) -> str:
         if name != leader and ratios:
             middle = times_text(ratios[len(ratios) // 2])
             told.append(f"{middle} those of {name} ({times_text(ratios[0])} to {times_text(ratios[-1])})")
-    return f"The largest stable steps of {leader} are, in the median scene, {listed(told)}." if told else ""
+    return f"The largest steps that hold with {leader} are, in the median scene, {listed(told)}." if told else ""
 
 
 def _frame(cases: Sequence[Row]) -> str:

@@ -45,13 +45,20 @@ def pairs(steps: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(pair_name(row) for row in steps))
 
 
+def is_true(row: Row, name: str) -> bool:
+    """Whether a column of yes or no says yes, of a table or of a file."""
+    return row.get(name) in (True, "true")
+
+
 def cell_text(row: Row) -> str:
-    """The largest stable step; ``its own`` for a method that chooses it; the verdict where none holds."""
+    """The largest stable step; ``its own`` for a method that chooses it; the verdict where none holds, with a question
+    mark where finer steps took too long to tell.
+    """
     if word(row, "best_verdict") != "holds":
-        return word(row, "best_verdict")
+        return f"{word(row, 'best_verdict')} ?" if is_true(row, "unsettled") else word(row, "best_verdict")
     if math.isnan(number(row, "stable_dt")):
         return "its own"
-    return f"{'≥ ' if row.get('bound') else ''}{shown('stable_dt', row['stable_dt'])}"
+    return f"{'≥ ' if is_true(row, 'bound') else ''}{shown('stable_dt', row['stable_dt'])}"
 
 
 def map_figure(steps: Sequence[Row]) -> Figure:

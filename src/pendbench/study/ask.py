@@ -11,7 +11,7 @@ def refusal(case: Case) -> str | None:
     """Why the engine cannot simulate the case's scene, or None. An engine that fails to say will fail to run, too."""
     try:
         reason = engine(case.engine).refuses(case.scene)
-    except Exception:
+    except (Exception, SystemExit):
         return None
     return None if reason is None else printable(str(reason))
 
@@ -20,5 +20,5 @@ def version(name: str) -> str:
     """The version of the program behind an engine, or why it is not known."""
     try:
         return printable(str(engine(name).version()))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         return f"not known ({describe(error)})"

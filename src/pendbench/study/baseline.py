@@ -49,7 +49,9 @@ def baseline_path(study: Path, *, quick: bool) -> Path:
 
 def write_baseline(path: Path, cases: pd.DataFrame) -> None:
     """Keep what the cases show as the baseline."""
-    numbers = [name for name in _FLOORS if name in cases and _INSTEAD.get(name) not in cases]
+    # Where a verdict says how large an error is, runs that broke would only add numbers of chance.
+    judged = "verdict" in cases
+    numbers = [name for name in _FLOORS if name in cases and not judged and _INSTEAD.get(name) not in cases]
     words = [name for name in _WORDS if name in cases]
     columns = [*_KEYS, "status", *words, *numbers, *(name for name in (*_STAYS, *_SHRINKS) if name in cases)]
     text = cases[columns].to_csv(index=False, float_format="%.6g", lineterminator="\n")

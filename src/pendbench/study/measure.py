@@ -97,9 +97,10 @@ def observed_order(dt: FloatArray, error: FloatArray, floor: float, ceiling: flo
     Each two neighbouring steps show an order, log(e1 / e2) / log(dt1 / dt2), where the coarser one's error is below
     `ceiling` (small), the finer one's above `floor` (not rounding), and it falls at all. A floor that is near bends
     orders down, terms of higher order at coarse steps bend them up; so the order is that of the finest pair that is
-    confirmed by a pair beside it, or as good as the steepest. A pair that confirms may reach a tenth of the floor. The plateau is the smallest error where finer steps did
-    not bring half of what that order promises, unless it is below `floor`. Where no pair shows an order, there still is
-    a plateau if the finest step did not bring the error down. None where there is neither.
+    confirmed by a pair beside it, or as good as the steepest. A pair that confirms may reach a tenth of the floor. The
+    plateau is the smallest error where finer steps did not bring half of what that order promises, unless it is below
+    `floor`. Where no pair shows an order, there still is a plateau if the finest step did not bring the error down.
+    None where there is neither.
     """
     known = np.isfinite(error)
     by_step = np.argsort(dt[known])[::-1]

@@ -20,7 +20,7 @@ from pendbench.errors import choose, printable
 from pendbench.physics.exact import normal_modes
 from pendbench.scene import Scene
 from pendbench.strict import input_error
-from pendbench.study.ask import refusal, version
+from pendbench.study.ask import version
 from pendbench.study.case import Case
 from pendbench.study.measure import growth_exponent
 from pendbench.study.plan import Plan, StudyFile
@@ -39,6 +39,7 @@ PRECISION: Final = 1.1
 
 _NO_FINER: Final = ("timed out", "out of memory")
 _FINER: Final = 5.0  # by this much, where no step holds yet
+_NEAR: Final = 1.5  # no step that is nearer to one that took too long is tried
 _FEWEST_STEPS: Final = 20  # a run of fewer says nothing about stability
 _RUN_COLUMNS: Final = ("verdict", "broke_s", "stays_s", "energy_drift_max", "gap_max", "steps")
 
@@ -63,8 +64,9 @@ def check(plan: Plan) -> None:
         if duration > known[name].duration:
             raise input_error(where, f"{name} is {duration:g}; allowed: up to {known[name].duration:g} s")
     for case in plan.cases:
-        if case.dt is not None and case.dt > duration_of(plan, case.scene):
-            raise input_error(plan.where, f"{case}: allowed: dt up to {duration_of(plan, case.scene):g} s")
+        most = duration_of(plan, case.scene) / _FEWEST_STEPS
+        if case.dt is not None and case.dt > most * (1 + 1e-9):
+            raise input_error(plan.where, f"{case}: allowed: dt up to {most:g} s, for {_FEWEST_STEPS} steps")
     for name in plan.options.lengths:
         if name not in known:
             raise input_error(plan.where, f"lengths: {choose('scene', printable(name), known)}")
@@ -106,9 +108,6 @@ class _Stability:
 
     def _measure_cases(self) -> None:
         """Step after step of every pair, the coarse ones first: a step that takes too long spares the finer ones."""
-        for case in self.plan.cases:
-            if (reason := refusal(case)) is not None:
-                self.found[case] = {"status": "refused", "reason": reason, "verdict": "refused"}
         waiting = {pair: sorted(cases, key=lambda case: -(case.dt or 0.0)) for pair, cases in self.pairs.items()}
         for number in range(max(map(len, waiting.values()), default=0)):
             batch = [cases[number] for cases in waiting.values() if number < len(cases)]
@@ -119,6 +118,9 @@ class _Stability:
         if case in self.found:
             return True
         coarser = [self.found[other] for other in self.pairs[pair_of(case)] if other in self.found]
+        if any(record["verdict"] == "refused" for record in coarser):
+            self.found[case] = coarser[0]
+            return True
         spent = [record for record in coarser if record["verdict"] in _NO_FINER]
         if spent:
             self.found[case] = {**spent[0], "reason": f"a larger step already did: {spent[0]['reason']}"}
@@ -158,9 +160,15 @@ class _Stability:
         return None if dt is None else Case(first.scene, first.engine, first.method, dt, first.settings)
 
     def _finer(self, cases: Sequence[Case]) -> float | None:
-        finest = min(cases, key=lambda case: case.dt or math.inf)
-        dt = _rounded((finest.dt or 0.0) / _FINER)
-        return None if dt < self.options.finest or self.found[finest]["verdict"] in _NO_FINER else dt
+        """A step to try where none holds yet: finer than all, or the finest that there may be time for."""
+        spent = [case.dt or 0.0 for case in cases if self.found[case]["verdict"] in _NO_FINER]
+        finished = [case.dt or 0.0 for case in cases if self.found[case]["verdict"] not in _NO_FINER]
+        if not finished:
+            return None
+        if not spent:
+            dt = _rounded(min(finished) / _FINER)
+            return dt if dt >= self.options.finest else None
+        return _rounded(math.sqrt(max(spent) * min(finished))) if min(finished) > _NEAR * max(spent) else None
 
     def _bracket(self, cases: Sequence[Case]) -> tuple[float | None, float | None]:
         """The largest step that holds, None where none does, and the smallest of those above it, None without."""
@@ -216,12 +224,18 @@ class _Stability:
             "method": first.method,
             "settings": first.settings_text,
             "adaptive": method.adaptive,
+            "substeps": method.substeps,
             "best_verdict": self.found[best]["verdict"],
             "reason": self.found[best]["reason"],
             "stable_dt": math.nan if low is None else low,
+            "unbroken_dt": max((case.dt or 0.0 for case in cases if self._is_whole(case)), default=math.nan),
+            "unsettled": low is None and any(self.found[case]["verdict"] in _NO_FINER for case in cases),
             "stable_dt_stiffest": (low or math.nan) * _stiffest(first.scene),
             "bound": low is not None and high is None,
         }
+
+    def _is_whole(self, case: Case) -> bool:
+        return case.dt is not None and self.found[case]["verdict"] in ("holds", "drifts")
 
     def _growth_rows(self, steps: dict[Pair, Record]) -> Iterator[Record]:
         """How the largest stable step falls with n, for each method over the scenes that differ in n alone."""
@@ -282,6 +296,6 @@ def _best(rows: Iterable[Record]) -> dict[str, float]:
     """The largest stable step of each scene."""
     best: dict[str, float] = {}
     for row in rows:
-        if row["stable_dt"] > 0:
+        if row["stable_dt"] > 0 and not row["substeps"]:
             best[row["scene"]] = max(best.get(row["scene"], 0.0), row["stable_dt"])
     return best

@@ -15,7 +15,7 @@ VERDICTS: Final = {
     "refused": "the engine cannot represent the scene",
     "gives up": "the method itself says that it cannot go on",
     "warned": "the engine warned about its own state",
-    "breaks": "the energy strays by more than its whole scale, a joint comes apart, or numbers are no longer finite",
+    "breaks": "the energy, or a rod, strays by more than its whole scale, or numbers are no longer finite",
     "resets": "the engine started again from its initial state",
     "timed out": "the run took longer than the study allows",
     "out of memory": "the run wanted more memory than the study allows",
@@ -54,11 +54,12 @@ def verdict_of(status: str, reason: str, t: FloatArray, strays: FloatArray, gap:
     status, reason: how it ended. t (k,) s: its samples; strays (k,): the energy's deviation there in units of the
     energy scale; gap (k,): the worst rod's relative error in length.
     """
-    lost = np.flatnonzero(~(np.abs(strays) <= BREAKS))
+    with np.errstate(invalid="ignore"):
+        lost = np.flatnonzero(~((np.abs(strays) <= BREAKS) & (np.abs(gap) <= BREAKS)))
     broke = float(t[lost[0]]) if lost.size else float("nan")
     if status == "ok":
         return Verdict(*_of_whole_run(broke, strays, gap), broke)
-    if lost.size and status not in ("warned", "reset"):
+    if lost.size and status != "reset":
         return Verdict("breaks", f"{_energy_lost(broke)}; then {reason}", broke)
     return Verdict(_OF_STATUS.get(status, status), reason, broke)
 
@@ -66,7 +67,7 @@ def verdict_of(status: str, reason: str, t: FloatArray, strays: FloatArray, gap:
 def _of_whole_run(broke: float, strays: FloatArray, gap: FloatArray) -> tuple[str, str]:
     if not np.isnan(broke):
         return "breaks", _energy_lost(broke)
-    worst, torn = float(np.abs(strays).max()), float(gap.max())
+    worst, torn = float(np.abs(strays).max()), float(np.abs(gap).max())
     if torn >= HOLDS:
         return "drifts", f"a rod is off its length by {torn:.2g} of it"
     if worst >= HOLDS:
@@ -75,4 +76,4 @@ def _of_whole_run(broke: float, strays: FloatArray, gap: FloatArray) -> tuple[st
 
 
 def _energy_lost(broke: float) -> str:
-    return f"the energy is astray by more than its scale at t = {broke:.3g} s"
+    return f"the energy, or a rod, is astray by more than its scale at t = {broke:.3g} s"

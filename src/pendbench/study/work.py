@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Final
@@ -35,6 +36,7 @@ _CURVE_POINTS: Final = 250
 _LONG_SAMPLES: Final = 20_000
 _FREE_RUNS: Final = 10
 _RACE_SAMPLES: Final = 400
+_JUDGED_NUMBERS: Final = 200_000  # angles of all samples together
 _APART: Final = 1e-10
 _MOVED: Final = 0.1  # rad: no longer where it was
 _PULLED: Final = 1e-5  # rad/s^2: more than what an equilibrium has by rounding, or by a nudge of 1e-9 rad
@@ -230,7 +232,8 @@ def measure_long_run(case: Case, steps: int) -> Record:
 def measure_stability(case: Case, duration: float) -> Record:
     """Run the case for `duration` (s) and judge it."""
     scene = replace(case.scene, duration=duration)
-    run = simulate(scene, case.engine, case.method, case.dt, **dict(case.settings))
+    times = _times_to_judge(scene, case.dt)
+    run = simulate(scene, case.engine, case.method, case.dt, times, **dict(case.settings))
     with np.errstate(over="ignore", invalid="ignore"):
         values, scale = energy(scene, run.theta, run.omega), energy_scale(scene)
         strays = (values - values[:1]) / scale if scale else values - values[:1]
@@ -245,6 +248,16 @@ def measure_stability(case: Case, duration: float) -> Record:
         "gap_max": _largest(run.gap),
         "steps": run.steps,
     }
+
+
+def _times_to_judge(scene: Scene, dt: float | None) -> FloatArray:
+    """Every step, or as many samples as memory allows: what strays for a moment is to be seen."""
+    most = max(1000, min(10_000, _JUDGED_NUMBERS // scene.n))
+    if dt is None:
+        return np.linspace(0.0, scene.duration, most + 1)
+    total = max(1, math.floor(scene.duration / dt + 1e-6))
+    counts = np.unique(np.linspace(0, total, min(total, most) + 1).round().astype(np.int64))
+    return np.asarray(counts * dt, dtype=np.float64)
 
 
 def _stays(scene: Scene, run: Trajectory) -> float | None:
