@@ -15,7 +15,8 @@ PACKAGE = Path(pendbench.__file__).parent
 #: The house, from the ground up: a module may import from its own floor and from those below.
 FLOORS = (
     ("errors",),
-    ("arrays", "bundled", "compiled", "files", "strict"),
+    ("arrays", "bundled", "compiled", "files", "processes", "strict"),
+    ("connect",),
     ("scene", "scene_file", "trajectory"),
     ("solvers",),
     ("physics",),
@@ -32,7 +33,16 @@ ONLY = {
     "solvers": {"arrays", "compiled"},
     "physics": {"arrays", "compiled", "errors", "scene", "solvers"},
     # Rows, and pure functions of arrays.
-    "report": {"errors", "files", "strict", "trajectory", "study.results", "study.measure", "study.verdict"},
+    "report": {
+        "errors",
+        "files",
+        "strict",
+        "trajectory",
+        "study.flips",
+        "study.measure",
+        "study.results",
+        "study.verdict",
+    },
     # An adapter translates.
     "engines.mujoco": {"arrays", "engines.mjcf", "engines.protocol", "scene", "trajectory"},
     "engines.pymunk": {"arrays", "engines.protocol", "scene", "trajectory"},
@@ -50,6 +60,7 @@ ONLY = {
     # Errors and times are taken in separate runs, by modules that do not meet.
     "study.clock": {"arrays", "engines.protocol", "scene"},
     "study.measure": {"arrays"},
+    "study.flips": {"arrays"},
     "study.verdict": {"arrays"},
     "study.results": set(),
 }
@@ -61,6 +72,7 @@ RESERVED = {
     "pinocchio": {"engines.pinocchio"},
     "matplotlib": {"report"},
     "pebble": {"study.jobs"},
+    "distributed": {"connect", "study.cluster", "study.cluster_worker"},
     "time": {"study.clock"},
     "datetime": set(),
     "psutil": {"study"},

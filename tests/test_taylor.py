@@ -191,7 +191,7 @@ def test_pendulum_for_two_thousand_seconds():
 
 
 def error_of(scene, until, tolerance):
-    """The worst angle of `taylor` at a time, rad, over the worst of DOP853's at the same tolerance or that tolerance."""
+    """The worst angle of `taylor` at a time, rad, over DOP853's at the same tolerance, or over that tolerance."""
     truth = pb.reference(scene, [until])
     found = {}
     for method in ("taylor", "adaptive"):

@@ -16,6 +16,7 @@ PAGES: Final = {
     "cost": "pendbench.report.cost",
     "stability": "pendbench.report.stability",
     "scaling": "pendbench.report.scaling",
+    "ensemble": "pendbench.report.ensemble",
 }
 
 _PLAIN: Final = "pendbench.report.plain"

@@ -204,9 +204,10 @@ def _judged(options: Mapping[str, Any]) -> str:
     return (
         f"Energy errors are in units of the energy scale; the limits are {number_text(HOLDS, '.0%')} and "
         f"{number_text(BREAKS, '.0%')} of it. They are looked at after every step, or at 1000 to 10,000 samples of "
-        f"longer runs. No run may take longer than {limit} s. A step that is not finished in that time spares the method "
-        "the finer ones. The search goes between the largest step that holds and the smallest failing one above it, "
-        "halving on a logarithmic scale until it is known to a tenth; where none holds, it goes on in fifths down to "
-        f"{finest} s. That a step holds does not say that every smaller one does: rounding and chaos have a word too.\n\n"
+        f"longer runs. No run may take longer than {limit} s. A step that is not finished in that time spares the "
+        "method the finer ones. The search goes between the largest step that holds and the smallest failing one "
+        "above it, halving on a logarithmic scale until it is known to a tenth; where none holds, it goes on in fifths "
+        f"down to {finest} s. That a step holds does not say that all smaller ones do: rounding and chaos have a part "
+        "in it.\n\n"
         f"{meanings}"
     )

@@ -6,12 +6,14 @@ import itertools
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation, State
 from pendbench.scene import Scene
+
+T = TypeVar("T")
 
 REPEATS = 5
 _LOOKS = 200
@@ -173,3 +175,10 @@ def race(
         if spent > scene.duration:
             break
     return Race(reached, spent, lost=False)
+
+
+def timed(call: Callable[[], T]) -> tuple[T, float]:
+    """What a call returns, and how long it took, s."""
+    begun = time.perf_counter()
+    value = call()
+    return value, time.perf_counter() - begun

@@ -16,6 +16,7 @@ KINDS: Final = {
     "chaos": "pendbench.study.chaos",
     "cost": "pendbench.study.cost",
     "stability": "pendbench.study.stability",
+    "ensemble": "pendbench.study.ensemble",
     "scaling": "pendbench.study.scaling",
 }
 
