@@ -116,7 +116,7 @@ def files(folder: Path) -> set[Path]:
     ("arguments", "said"),
     [
         ([], "which study? a bundled name (--list shows them) or a path to a .toml file"),
-        (["--quik"], "unknown option '--quik'; did you mean '--quick'? allowed: --check, --engines, --fresh, --help,"),
+        (["--quik"], "unknown option '--quik'; did you mean '--quick'? allowed: --check, --cluster, --engines, "),
         (["chaos", "--nonsense=5"], "unknown option '--nonsense=5'; allowed: --check, "),
         (["chaos", "double"], "'double' after 'chaos'; allowed: one study"),
         (["chaos", "--out"], "argument --out: expected one argument"),

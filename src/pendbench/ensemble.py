@@ -1,18 +1,22 @@
-"""Many starts of one chain: compiled across trajectories, so that vector units work, and spread over threads."""
+"""Many starts of one chain: compiled across trajectories, for vector units, and spread over threads or machines."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
+from pendbench.connect import LOCAL, connected
 from pendbench.errors import InputError, choose, printable
 from pendbench.scene import ANGLE, RATE, Scene, load_scene
 from pendbench.strict import show
@@ -43,6 +47,8 @@ class Ensemble:
 
 
 Progress = Callable[[int, int], None]
+#: Runs some starts (K, 2n): their states (k, K, 2n) and statuses; or the times of their flips.
+Run = Callable[[FloatArray], tuple[Any, Any]]
 
 
 def simulate_ensemble(
@@ -55,13 +61,15 @@ def simulate_ensemble(
     times: npt.ArrayLike | None = None,
     tolerance: float = TOLERANCE,
     threads: int | None = None,
+    cluster: str | None = None,
     progress: Progress | None = None,
 ) -> Ensemble:
     """Run the scene's chain from each of the starts angles (K, n) rad, rates (K, n) rad/s (at rest without them).
 
     times (k,) s, rising; the scene's duration alone where None. method: `adaptive` (dt None), with the local error
     allowed per step; or `rk4`, whose times must be whole multiples of its step dt, s. threads: one for each processor
-    where None. progress(done, K) is called as trajectories are done; whatever it raises cancels the rest.
+    where None. cluster: the address of a Dask cluster to run on instead, or `local` for one with as many processes.
+    progress(done, K) is called as trajectories are done; whatever it raises cancels the rest.
 
     Results are those of `simulate` from each start, but for rounding. The states asked for, 16 k K n bytes, are all
     that grows with K: whoever has no room for them asks for a part of the starts at a time.
@@ -71,11 +79,10 @@ def simulate_ensemble(
     chosen = scene if isinstance(scene, Scene) else load_scene(scene)
     starts = _starts(chosen, angles, rates)
     asked = _times(times, chosen.duration)
-    workers = _workers(threads)
-    run = _runner(chosen, method, dt, asked, tolerance)
+    make = partial(_runner, chosen, method, dt, asked, tolerance)
     k, runs, n = len(asked), len(starts), chosen.n
     states, status = np.empty((k, runs, 2 * n)), np.empty(runs, dtype="<U16")
-    for low, high, out, how in _in_chunks(run, starts, workers):
+    for low, high, out, how in _in_chunks(make, starts, threads, cluster):
         states[:, low:high], status[low:high] = out, how
         if progress is not None:
             progress(high, runs)
@@ -89,6 +96,7 @@ def first_flips(
     *,
     tolerance: float = TOLERANCE,
     threads: int | None = None,
+    cluster: str | None = None,
     progress: Progress | None = None,
 ) -> FloatArray:
     """When a rod of the chain first goes over the top, |theta| = pi, from each start: (K,) s.
@@ -100,29 +108,52 @@ def first_flips(
     starts = _starts(chosen, angles, rates)
     if np.abs(starts[:, : chosen.n]).max(initial=0.0) > math.pi:
         raise InputError("angles: one begins beyond pi; allowed: from -pi to pi")
-    run = _runner(chosen, "adaptive", None, np.array([chosen.duration]), tolerance, limit=math.pi, flips=True)
+    end = np.array([chosen.duration])
+    make = partial(_runner, chosen, "adaptive", None, end, tolerance, limit=math.pi, flips=True)
     found = np.empty(len(starts))
-    for low, high, out, _ in _in_chunks(run, starts, _workers(threads)):
+    for low, high, out, _ in _in_chunks(make, starts, threads, cluster):
         found[low:high] = out
         if progress is not None:
             progress(high, len(starts))
     return found
 
 
-def _in_chunks(run: Callable[[FloatArray], tuple[Any, Any]], starts: FloatArray, workers: int) -> Iterator[Any]:
+@contextmanager
+def _pool(threads: int | None, cluster: str | None) -> Iterator[tuple[Executor, int]]:
+    """Where chunks run, and how many at once."""
+    workers = _workers(threads)
+    if cluster is None:
+        with ThreadPoolExecutor(workers) as pool:
+            yield pool, workers
+        return
+    if threads is not None and cluster != LOCAL:
+        raise InputError(f"threads is {threads}; allowed: none, since a cluster has the workers that it has")
+    with connected(cluster, workers) as client, client.get_executor(pure=False) as pool:
+        yield pool, sum(client.nthreads().values())
+
+
+def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None, cluster: str | None) -> Iterator[Any]:
     """The results of chunks of the starts, in order; a generator that is closed cancels those that have not begun."""
-    bounds = [(low, min(low + _CHUNK, len(starts))) for low in range(0, len(starts), _CHUNK)]
-    with ThreadPoolExecutor(workers) as pool:
-        waiting = [(low, high, pool.submit(run, starts[low:high])) for low, high in bounds[: 2 * workers]]
-        rest = iter(bounds[2 * workers :])
+    make()  # what cannot be used is refused before anything runs
+    bounds = ((low, min(low + _CHUNK, len(starts))) for low in range(0, len(starts), _CHUNK))
+    waiting: list[tuple[int, int, Any]] = []
+    with _pool(threads, cluster) as (pool, workers):
         try:
-            while waiting:
+            while True:
+                for low, high in itertools.islice(bounds, 2 * workers - len(waiting)):
+                    waiting.append((low, high, pool.submit(_run_chunk, make, starts[low:high])))
+                if not waiting:
+                    return
                 low, high, future = waiting.pop(0)
                 yield low, high, *future.result()
-                if (following := next(rest, None)) is not None:
-                    waiting.append((*following, pool.submit(run, starts[slice(*following)])))
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            for _, _, future in waiting:
+                future.cancel()
+
+
+def _run_chunk(make: Callable[[], Run], starts: FloatArray) -> tuple[Any, Any]:
+    """Make what runs some starts where they are to be run: it cannot travel itself."""
+    return make()(starts)
 
 
 def _runner(
@@ -134,8 +165,8 @@ def _runner(
     limit: float = math.inf,
     *,
     flips: bool = False,
-) -> Callable[[FloatArray], tuple[Any, Any]]:
-    """What runs some starts: their states (k, K, 2n) and statuses; or the times of their flips."""
+) -> Run:
+    """What runs some starts, and gives their states or, with `flips`, the times of those."""
     if method not in METHODS:
         raise InputError(f"simulate_ensemble: {choose('method', printable(str(method)), METHODS)}")
     if not (isinstance(tolerance, float) and _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]):
@@ -165,7 +196,7 @@ def _runner(
     return run
 
 
-def _fixed_runner(scene: Scene, dt: float | None, times: FloatArray) -> Callable[[FloatArray], tuple[Any, Any]]:
+def _fixed_runner(scene: Scene, dt: float | None, times: FloatArray) -> Run:
     from pendbench.physics.many import many_system_of
     from pendbench.solvers.many import runge_kutta_many
     from pendbench.solvers.tableaux import RK4

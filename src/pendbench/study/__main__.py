@@ -39,6 +39,7 @@ def parser() -> argparse.ArgumentParser:
     options.add_argument("--quick", action="store_true", help="the study's small variant: seconds instead of minutes")
     options.add_argument("--engines", metavar="A,B", help="only these of the study's engines")
     options.add_argument("--jobs", type=int, metavar="N", help="worker processes (default: one per processor)")
+    options.add_argument("--cluster", metavar="ADDRESS", help="run on this Dask cluster; `local` starts one here")
     options.add_argument("--check", action="store_true", help="fail where a result got worse than the study's baseline")
     options.add_argument("--fresh", action="store_true", help="run again what is already in the folder")
     options.add_argument("--update-baseline", action="store_true", help="make these results the study's baseline")
@@ -119,6 +120,7 @@ def _request(chosen: argparse.Namespace) -> Request:
         check=chosen.check,
         fresh=chosen.fresh,
         update_baseline=chosen.update_baseline,
+        cluster=chosen.cluster,
     )
 
 

@@ -10,11 +10,13 @@ from typing import Final
 
 import pandas as pd
 
+from pendbench.connect import LOCAL, check_cluster
 from pendbench.errors import InputError
 from pendbench.files import alone_in
 from pendbench.report import write_report
 from pendbench.strict import show, shown_path
 from pendbench.study.baseline import baseline_path, read_baseline, regressions, write_baseline
+from pendbench.study.cluster import DaskPool
 from pendbench.study.jobs import LocalPool
 from pendbench.study.kinds import kind
 from pendbench.study.plan import Plan, find_study, load_plan
@@ -28,7 +30,10 @@ _MOST_WORKERS: Final = 1024
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked for. study: a name or a file. out: a folder, `results/NAME` where None. jobs: worker processes."""
+    """What was asked for. study: a name or a file. out: a folder, `results/NAME` where None. jobs: worker processes.
+
+    cluster: the address of a Dask cluster to run on, or `local`.
+    """
 
     study: str | os.PathLike[str]
     out: Path | None = None
@@ -38,6 +43,7 @@ class Request:
     check: bool = False
     fresh: bool = False
     update_baseline: bool = False
+    cluster: str | None = None
 
 
 @dataclass(frozen=True)
@@ -75,16 +81,14 @@ def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
 
     Raises `InputError`, one line, before anything is written where the request cannot be met.
     """
-    workers = processors() if request.jobs is None else request.jobs
-    if type(workers) is not int or not 1 <= workers <= _MOST_WORKERS:
-        raise InputError(f"--jobs is {show(workers)}; allowed: 1 to {_MOST_WORKERS}")
+    workers = _workers(request)
     plan = load_plan(request.study, quick=request.quick, engines=request.engines)
     where = baseline_path(find_study(request.study), quick=request.quick)
     baseline = read_baseline(where) if request.check else None
     out = _folder(request, plan)
     watcher = watcher or Silence()
     with alone_in(out, lambda: watcher.begin("waiting for another study in this folder", 1, 0)):
-        results = _run(plan, Store(out / "work"), watcher, workers, fresh=request.fresh)
+        results = _run(plan, request, out, watcher, workers)
         write_report(results, out)
     if request.update_baseline:
         write_baseline(where, results.cases)
@@ -92,13 +96,27 @@ def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
     return Finished(results, out, worse)
 
 
-def _run(plan: Plan, store: Store, watcher: Watcher, workers: int, *, fresh: bool) -> Results:
-    if fresh:
+def _workers(request: Request) -> int:
+    """How many processes there are to be on this machine."""
+    workers = processors() if request.jobs is None else request.jobs
+    if type(workers) is not int or not 1 <= workers <= _MOST_WORKERS:
+        raise InputError(f"--jobs is {show(workers)}; allowed: 1 to {_MOST_WORKERS}")
+    if request.cluster is not None:
+        check_cluster(request.cluster)
+        if request.jobs is not None and request.cluster != LOCAL:
+            raise InputError(f"--jobs is {workers}; allowed: none, since a cluster has the workers that it has")
+    return workers
+
+
+def _run(plan: Plan, request: Request, out: Path, watcher: Watcher, workers: int) -> Results:
+    store = Store((out if request.cluster is None else out.absolute()) / "work")
+    if request.fresh:
         store.clear()
-    with LocalPool(workers) as pool:
+    with LocalPool(workers) if request.cluster is None else DaskPool(request.cluster, workers, store) as pool:
         runner = Runner(store, pool, watcher, memory_limit=plan.options.memory_limit)
         results = kind(plan.options.kind).run(plan, runner)
-    return replace(results, provenance=provenance(plan, workers))
+        facts = provenance(plan, pool.workers) | (pool.facts if isinstance(pool, DaskPool) else {})
+    return replace(results, provenance=facts)
 
 
 def run_study(
@@ -109,11 +127,13 @@ def run_study(
     engines: str | Sequence[str] = (),
     jobs: int | None = None,
     fresh: bool = False,
+    cluster: str | None = None,
 ) -> pd.DataFrame:
     """Run a study, write its report to `out` (default `results/NAME`), and return its table, one row per case.
 
     study: a bundled study's name or a file. quick: the study's quick variant. engines: only this one, or these. jobs:
-    worker processes, one per processor by default. fresh: run again what an earlier run left in `out`. Scripts that
+    worker processes, one per processor by default. fresh: run again what an earlier run left in `out`. cluster: the
+    address of a Dask cluster whose machines share the folder `out`, or `local` for one of this machine. Scripts that
     call this need the usual `if __name__ == "__main__":` guard, since it starts processes.
 
     Raises InputError, one line, for whatever cannot be used.
@@ -123,5 +143,5 @@ def run_study(
     except TypeError:
         raise InputError(f"--out {show(out)}: not a path; allowed: a folder that can be written") from None
     chosen = (engines,) if isinstance(engines, str) else tuple(engines)
-    request = Request(study, folder, quick=quick, engines=chosen, jobs=jobs, fresh=fresh)
+    request = Request(study, folder, quick=quick, engines=chosen, jobs=jobs, fresh=fresh, cluster=cluster)
     return run_request(request).results.cases

@@ -1,7 +1,8 @@
 """One interface for "run these": jobs in, outcomes out as they finish, whatever became of them.
 
 The local pool runs each job in a process of its own pool, with a limit of time and one of memory; a job that raises,
-hangs, takes too much or takes its process with it is an outcome with a status, and the others go on.
+hangs, takes too much or takes its process with it is an outcome with a status, and the others go on. The same on the
+machines of a Dask cluster: `study.cluster`.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from types import TracebackType
 from typing import Any, Final, Protocol, Self
 
 from pendbench.engines.protocol import Fault
 from pendbench.errors import InputError, describe
+from pendbench.processes import deaf_to_interrupts, refuse_without_guard
 
 _STOPPING_S: Final = 0.5  # how long a worker has to end by itself; it holds nothing that could be lost
 _NO_WORKERS: Final = "the worker processes died as they started; what was finished is kept"
@@ -75,13 +76,11 @@ class LocalPool:
     def __enter__(self) -> Self:
         from pebble import CONSTS, ProcessPool
 
-        if getattr(multiprocessing.current_process(), "_inheriting", False):
-            # A worker runs the user's script again to know its functions, and the script has come here again.
-            raise SystemExit('error: a script that runs a study needs the line `if __name__ == "__main__":` before it')
+        refuse_without_guard()
         CONSTS.term_timeout = _STOPPING_S
         context = multiprocessing.get_context("spawn")
         self._pool = ProcessPool(max_workers=self.workers, context=context, initializer=_begin)
-        with _deaf_to_interrupts():
+        with deaf_to_interrupts():
             assert self._pool.active  # asking starts it
         return self
 
@@ -121,23 +120,6 @@ class LocalPool:
             return self._pool.schedule(_call, args=(packed, job.memory_limit), timeout=job.time_limit)
         except RuntimeError:
             raise InputError(_NO_WORKERS) from None
-
-
-@contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Processes and threads that are started in this block never see a Ctrl-C; it is the main process that acts on it.
-
-    Otherwise each worker that is still starting would print a traceback.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    resource_tracker.ensure_running()  # starting it would lift the block
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _share_stopping_time(workers: int) -> None:

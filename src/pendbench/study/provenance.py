@@ -16,7 +16,8 @@ _LIBRARIES = ("numpy", "scipy", "numba", "pandas")
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def _processor() -> str:
+def processor() -> str:
+    """The name of this machine's processor."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
@@ -36,7 +37,7 @@ def provenance(plan: Plan, workers: int) -> dict[str, Any]:
         **{name: metadata.version(name) for name in _LIBRARIES},
         "python": platform.python_version(),
         "operating system": platform.platform(),
-        "processor": _processor(),
+        "processor": processor(),
         "logical processors": os.cpu_count(),
         "worker processes": workers,
         "threads per engine": 1,

@@ -1,0 +1,35 @@
+"""What every part of the project that starts processes has to mind."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+
+
+def refuse_without_guard() -> None:
+    """Leave where a process that is being started has come here.
+
+    A worker runs the user's script again to know its functions: the script must not start workers then.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise SystemExit('error: a script that runs a study needs the line `if __name__ == "__main__":` before it')
+
+
+@contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """Processes and threads that are started in this block never see a Ctrl-C; it is the main process that acts on it.
+
+    Otherwise each worker that is still starting would print a traceback.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # starting it would lift the block
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
