@@ -91,7 +91,7 @@ def verdict(found: float, *, most: float = np.inf, least: float = -np.inf) -> st
 def _accelerate(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray, times: int) -> None:
     """Each call waits for the one before it, as the steps of a solver do."""
     for _ in range(times):
-        write_accelerations(system, theta, omega, out)
+        write_accelerations(system, 0.0, theta, omega, out)
         theta[0] += 1e-15 * out[0]
 
 

@@ -40,7 +40,7 @@ def bends(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:  #
 def elimination(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:
     """Sines and cosines, and the way inwards."""
     for _ in range(times):
-        alpha, beta = inwards(system, theta, omega)
+        alpha, beta = inwards(system, 0.0, theta, omega)
         out[0] = alpha + beta
         theta[0] += 1e-12
 
@@ -49,7 +49,7 @@ def elimination(system: Any, theta: Any, omega: Any, out: Any, times: int) -> No
 def whole(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:
     """All of it."""
     for _ in range(times):
-        write_accelerations(system, theta, omega, out)
+        write_accelerations(system, 0.0, theta, omega, out)
         theta[0] += 1e-12
 
 

@@ -18,5 +18,5 @@ def coupling_matrix_as_printed(scene: Scene, theta: FloatArray) -> FloatArray:
 
 def accelerations_as_printed(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
     """theta'' (n,) rad/s^2 of the misprinted system. theta: (n,) rad, omega: (n,) rad/s."""  # noqa: D403
-    torques = coupling_matrix_as_printed(scene, theta) @ omega**2 - dense.gravity_torques(scene, theta)
+    torques = coupling_matrix_as_printed(scene, theta) @ omega**2 - dense.weight_torques(scene, theta)
     return np.asarray(cho_solve(cho_factor(dense.mass_matrix(scene, theta)), torques))

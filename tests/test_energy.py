@@ -75,10 +75,10 @@ def test_energy_and_momentum_agree_with_the_matrices():
         np.testing.assert_allclose(energy.angular_momentum(scene, angles, rates), momenta.sum(), rtol=0, atol=1e-12)
 
 
-def test_gravity_torques_are_the_slopes_of_the_potential():
+def test_weight_torques_are_the_slopes_of_the_potential():
     scene, step = lively(), 1e-5
     theta = np.array([0.7, -2.0, 1.1])
-    for i, torque in enumerate(dense.gravity_torques(scene, theta)):
+    for i, torque in enumerate(dense.weight_torques(scene, theta)):
         nudge = step * np.eye(3)[i]
         slope = energy.potential_energy(scene, theta + nudge) - energy.potential_energy(scene, theta - nudge)
         np.testing.assert_allclose(slope / (2 * step), torque, rtol=0, atol=1e-8)
@@ -150,7 +150,7 @@ def test_gravity_alone_changes_the_angular_momentum():
     scene, (theta, omega) = lively(), random_states(np.random.default_rng(5))
     for state in zip(theta, omega, strict=True):
         rate = rate_along_the_motion(energy.angular_momentum, scene, *state)
-        torque = -dense.gravity_torques(scene, state[0]).sum()
+        torque = -dense.weight_torques(scene, state[0]).sum()
         np.testing.assert_allclose(rate, torque, rtol=0, atol=1e-6 * energy.energy_scale(scene))
 
 

@@ -17,7 +17,7 @@ from pendbench.engines.mujoco import MujocoEngine
 from pendbench.engines.protocol import Fault
 from pendbench.errors import InputError
 from pendbench.physics.dense import accelerations
-from pendbench.scene import Effects, Scene, load_scene
+from pendbench.scene import Scene, load_scene
 from scenes import chain, random_chain
 
 ENGINE = MujocoEngine()
@@ -137,15 +137,6 @@ def test_a_rod_that_is_too_short_would_be_wrong_without_a_word():
     run.advance(1)
     assert run.health() is None
     assert run.state().omega == 0.0  # it should have fallen; if this fails, MuJoCo is better than the limit says
-
-
-def test_refuses_an_effect_that_it_does_not_know():
-    @dataclasses.dataclass(frozen=True)
-    class More(Effects):
-        wind: float | None = None
-
-    assert ENGINE.refuses(dataclasses.replace(chain(2), effects=More(gravity=9.81))) is None
-    assert "wind" in ENGINE.refuses(dataclasses.replace(chain(2), effects=More(gravity=9.81, wind=1.0)))
 
 
 # What goes wrong.

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pendbench.engines import registry
-from pendbench.engines.protocol import Fault
+from pendbench.engines.protocol import Fault, refusal
 from pendbench.errors import MissingEngineError
 from pendbench.physics.recursion import accelerations
 from pendbench.recording import simulate
@@ -139,12 +139,9 @@ def test_memory_grows_as_the_refusal_says():
 
 
 def test_refuses_an_effect_that_it_does_not_know():
-    @dataclasses.dataclass(frozen=True)
-    class More(Effects):
-        wind: float | None = None
-
-    assert ENGINE.refuses(dataclasses.replace(chain(2), effects=More(gravity=9.81))) is None
-    assert "wind" in ENGINE.refuses(dataclasses.replace(chain(2), effects=More(gravity=9.81, wind=1.0)))
+    damped = dataclasses.replace(chain(2), effects=Effects(gravity=9.81, joint_damping=0.1))
+    assert refusal(ENGINE, "rk4", chain(2)) is None
+    assert refusal(ENGINE, "rk4", damped) == "the adapter has no joint_damping"
 
 
 # What goes wrong.

@@ -9,7 +9,7 @@ import pymunk
 import pytest
 from scipy.integrate import solve_ivp
 
-from pendbench.engines.protocol import State
+from pendbench.engines.protocol import State, refusal
 from pendbench.engines.pymunk import PymunkEngine, enough_iterations
 from pendbench.physics.dense import accelerations
 from pendbench.physics.geometry import distance, wrapped
@@ -162,10 +162,7 @@ def test_hard_numbers_give_a_state_or_a_fault_and_no_exception():
         assert run.health() is not None or np.isfinite(run.state().theta).all()
 
 
-def test_refuses_an_effect_that_it_does_not_know():
-    @dataclasses.dataclass(frozen=True)
-    class More(Effects):
-        wind: float | None = None
-
-    assert ENGINE.refuses(dataclasses.replace(chain(2), effects=More(gravity=9.81))) is None
-    assert "wind" in ENGINE.refuses(dataclasses.replace(chain(2), effects=More(gravity=9.81, wind=1.0)))
+def test_refuses_rods_with_mass():
+    heavy = dataclasses.replace(chain(2), effects=Effects(gravity=9.81, rod_mass=0.1))
+    assert refusal(ENGINE, "tuned", chain(2)) is None
+    assert refusal(ENGINE, "tuned", heavy).startswith("no rod_mass: its masses are points")

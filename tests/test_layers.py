@@ -16,7 +16,8 @@ PACKAGE = Path(pendbench.__file__).parent
 FLOORS = (
     ("errors",),
     ("arrays", "bundled", "compiled", "files", "processes", "strict"),
-    ("connect",),
+    ("connect", "ranges"),
+    ("effects",),
     ("scene", "scene_file", "trajectory"),
     ("solvers",),
     ("physics",),
@@ -31,7 +32,7 @@ FLOORS = (
 #: What a part of the house may import of the rest of it, where that is less than its floor would allow.
 ONLY = {
     "solvers": {"arrays", "compiled"},
-    "physics": {"arrays", "compiled", "errors", "scene", "solvers"},
+    "physics": {"arrays", "compiled", "effects", "errors", "scene", "solvers"},
     # Rows, and pure functions of arrays.
     "report": {
         "errors",
@@ -44,8 +45,17 @@ ONLY = {
         "study.verdict",
     },
     # An adapter translates.
-    "engines.mujoco": {"arrays", "engines.mjcf", "engines.protocol", "scene", "trajectory"},
-    "engines.pymunk": {"arrays", "engines.protocol", "scene", "trajectory"},
+    "engines.mujoco": {"arrays", "engines.mjcf", "engines.mujoco_forces", "engines.protocol", "scene", "trajectory"},
+    "engines.mujoco_forces": {"arrays", "engines.mjcf", "physics.acting", "scene"},
+    "engines.pymunk": {
+        "arrays",
+        "engines.protocol",
+        "engines.pymunk_forces",
+        "physics.acting",
+        "scene",
+        "trajectory",
+    },
+    "engines.pymunk_forces": {"arrays", "physics.acting", "physics.geometry", "scene"},
     "engines.pinocchio": {"arrays", "engines.protocol", "scene", "trajectory"},
     "engines.analytic": {
         "arrays",
@@ -66,8 +76,8 @@ ONLY = {
 }
 #: Libraries that only these may import.
 RESERVED = {
-    "mujoco": {"engines.mujoco", "engines.mjcf"},
-    "pymunk": {"engines.pymunk"},
+    "mujoco": {"engines.mujoco", "engines.mujoco_forces", "engines.mjcf"},
+    "pymunk": {"engines.pymunk", "engines.pymunk_forces"},
     "heyoka": {"engines.heyoka"},
     "pinocchio": {"engines.pinocchio"},
     "matplotlib": {"report"},
@@ -76,8 +86,8 @@ RESERVED = {
     "time": {"study.clock"},
     "datetime": set(),
     "psutil": {"study"},
-    "pydantic": {"scene", "scene_file", "strict", "study"},
-    "pydantic_core": {"scene", "strict"},
+    "pydantic": {"scene_file", "strict", "study"},
+    "pydantic_core": {"effects.table", "ranges", "strict"},
 }
 #: Equations and methods know no file and no clock.
 PURE = ("physics", "solvers")

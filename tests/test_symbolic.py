@@ -164,6 +164,6 @@ def test_dense_form_is_the_lagrangian_s():
     for derived, found in (
         (derived_mass, dense.mass_matrix(scene, angles)),
         (derived_coupling, dense.coupling_matrix(scene, angles)),
-        (derived_gravity, dense.gravity_torques(scene, angles)),
+        (derived_gravity, dense.weight_torques(scene, angles)),
     ):
         np.testing.assert_allclose(found, sp.lambdify(symbols, derived)(*values), rtol=0, atol=1e-13)

@@ -19,10 +19,10 @@ from scenes import random_chain
 SYMPLECTIC = ["gauss4", "gauss6", "rattle", "frame"]
 
 
-def written(kernel: object, scene: Scene, theta: np.ndarray, other: np.ndarray) -> np.ndarray:
+def written(kernel: object, scene: Scene, *arguments: object) -> np.ndarray:
     """What a kernel of `canonical` writes."""
     out = np.empty(scene.n)
-    kernel(system_of(scene), np.array(theta), np.array(other), out)
+    kernel(system_of(scene), *(np.array(a) if isinstance(a, np.ndarray) else a for a in arguments), out)
     return out
 
 
@@ -51,7 +51,7 @@ def test_forces_are_the_gradient_of_the_lagrangian(gravity: float | None) -> Non
 
     steps = h * np.eye(scene.n)
     gradient = [(lagrangian(scene.angles + s) - lagrangian(scene.angles - s)) / (2 * h) for s in steps]
-    found = written(canonical.write_forces, scene, scene.angles, scene.rates)
+    found = written(canonical.write_forces, scene, 0.0, scene.angles, scene.rates)
     assert found == pytest.approx(gradient, rel=1e-7, abs=1e-7)  # h^2, and rounding over h
 
 

@@ -25,7 +25,7 @@ config: Any = numba_config  # its attributes are set while it is imported
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent
-_KERNEL_SOURCES = ("compiled.py", "physics/*.py", "solvers/*.py")
+_KERNEL_SOURCES = ("compiled.py", "effects/*.py", "physics/*.py", "solvers/*.py")
 
 #: Division by zero gives inf or nan, as in numpy: a test before each division would cost time and catch nothing.
 #: A product and a sum may be rounded once instead of twice.
@@ -119,7 +119,15 @@ def specialise(generic: Callable[..., None], system: type, kernel: Callable[...,
 
         return call
 
-    overload(generic, jit_options=_INLINED, strict=False)(choose)
+    chosen_by_type(generic)(choose)
+
+
+def chosen_by_type(generic: Callable[..., Any]) -> Callable[[Kernel], Kernel]:
+    """Have a kernel that calls `generic` call what the decorated function returns for its arguments' types.
+
+    That is a function of the same arguments, or None where the types are not its own.
+    """
+    return overload(generic, jit_options=_INLINED, strict=False)
 
 
 def _know_source(source: Path) -> None:

@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Method, Setting, Simulation, State
+from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Method, Setting, Simulation, State, refusal
 from pendbench.engines.registry import engine as engine_of
 from pendbench.engines.registry import engine_names, flaw_of
 from pendbench.errors import InputError, choose, describe, printable
-from pendbench.scene import Range, Scene, load_scene
+from pendbench.ranges import Range
+from pendbench.scene import Scene, load_scene
 from pendbench.strict import show
 from pendbench.trajectory import STATUSES, Trajectory
 
@@ -119,7 +120,7 @@ def _step(name: str, method: Method, dt: object) -> float | None:
             raise InputError(f"dt is {show(dt)}; allowed: none, since method {name!r} chooses its steps")
         return None
     try:
-        return _DT.number(dt)
+        return _DT.read(dt)
     except ValueError as error:
         found = "missing" if dt is None else show(dt)
         raise InputError(f"dt is {found}; allowed: {error}, the step of method {name!r}") from None
@@ -170,8 +171,8 @@ def record(asked: Asked) -> Trajectory:
     """Run what a plan says. Whatever the engine does, it ends in a trajectory and not in an exception."""
     samples = Samples(asked.scene.n)
     try:
-        refusal = asked.engine.refuses(asked.scene)
-        fault = Fault("refused", str(refusal)) if refusal is not None else _fill(samples, asked)
+        refused = refusal(asked.engine, asked.method, asked.scene)
+        fault = Fault("refused", str(refused)) if refused is not None else _fill(samples, asked)
     except MemoryError as error:
         fault = Fault("out of memory", describe(error))
     except Exception as error:

@@ -5,45 +5,23 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
-from numbers import Real
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, cast
+from typing import Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
+from pendbench.effects import Effects
+from pendbench.effects.term import Term
 from pendbench.errors import InputError
+from pendbench.ranges import Range
 from pendbench.strict import input_error, show
 
-
-@dataclass(frozen=True)
-class Range:
-    """The finite numbers from low to high, both included."""
-
-    low: float
-    high: float
-    unit: str
-
-    def __str__(self) -> str:
-        return f"a number from {self.low:g} to {self.high:g} {self.unit}"
-
-    def number(self, value: object) -> float:
-        """The value as a float. Raises `ValueError`, saying what is allowed, for anything but a number in the range."""
-        if isinstance(value, bool) or not isinstance(value, Real):
-            raise ValueError(str(self))
-        number: Any = value  # compared before it is converted: an integer can be too large for a float
-        if not self.low <= number <= self.high:
-            raise ValueError(str(self))
-        return float(number)
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """A file's number is checked as one given in Python is: ``Annotated[float, Range(...)]`` in a table."""
-        from pydantic_core import core_schema
-
-        return core_schema.no_info_plain_validator_function(self.number)
-
+__all__ = ["Effects", "Scene", "load_scene"]
 
 # Far beyond any chain, and such that no product in the equations of motion overflows: the largest, of a mass ratio of
 # 1e100, a length ratio of 1e100 and a rate squared, stays below 1e308.
@@ -53,45 +31,18 @@ LENGTH: Final = Range(1e-50, 1e50, "m")
 ANGLE: Final = Range(-1e9, 1e9, "rad")
 RATE: Final = Range(-1e9, 1e9, "rad/s")
 DURATION: Final = Range(1e-50, 1e9, "s")
-# Downwards: a chain in upward gravity is the same chain with pi added to its angles.
-GRAVITY: Final = Range(0.0, 1e9, "m/s^2")
 MAX_LINKS: Final = 1_000_000
-
-
-@dataclass(frozen=True)
-class Effects:
-    """What acts on the chain. None: the scene does not call for it, and nothing of it is simulated.
-
-    This is the one place where an effect is declared: a field here is a key of the table [effects] of a scene file,
-    with the range given here. An effect of several numbers is a frozen dataclass of such fields, or a tuple, so that
-    effects can be compared and hashed.
-
-    gravity: m/s^2, downwards.
-    """
-
-    __pydantic_config__: ClassVar[Any] = {"extra": "forbid"}
-    KEYS_ARE: ClassVar[str] = "effect"
-
-    gravity: Annotated[float, GRAVITY] | None = None
-
-    def __post_init__(self) -> None:
-        if self.gravity is not None:
-            object.__setattr__(self, "gravity", _number("gravity", self.gravity, GRAVITY))
-
-    def named(self) -> tuple[str, ...]:
-        """The names of the effects that the scene calls for."""
-        return tuple(f.name for f in dataclasses.fields(self) if getattr(self, f.name) is not None)
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A chain of n point masses on massless rods, and what happens to it.
+    """A chain of n point masses on rods, which are massless unless an effect says otherwise, and what happens to it.
 
     masses (n,) kg and lengths (n,) m from the pivot outwards; angles (n,) rad, absolute, from the downward vertical,
     counter-clockwise positive; rates (n,) rad/s; duration s. The arrays are copied, and read-only.
 
-    Raises `InputError`, one line, for arrays that are not (n,) with 1 <= n <= `MAX_LINKS`, and for numbers outside
-    `MASS`, `LENGTH`, `ANGLE`, `RATE` and `DURATION`.
+    Raises `InputError`, one line, for arrays that are not (n,) with 1 <= n <= `MAX_LINKS`, for numbers outside `MASS`,
+    `LENGTH`, `ANGLE`, `RATE` and `DURATION`, and for effects that do not fit n links.
     """
 
     name: str
@@ -121,6 +72,7 @@ class Scene:
         for field in ("lengths", "angles", "rates"):
             if len(getattr(self, field)) != self.n:
                 raise InputError(disagreement("masses", self.n, field, len(getattr(self, field))))
+        self.effects.terms(self.n)  # raises where they do not fit
 
     def __reduce__(self) -> tuple[type[Scene], tuple[Any, ...]]:
         """Pickled by what it was made from, so that its arrays are read-only in another process too."""
@@ -131,6 +83,11 @@ class Scene:
         """How many links the chain has."""
         return len(self.masses)
 
+    @cached_property
+    def terms(self) -> Mapping[str, Term]:
+        """What acts on the chain, by the effects' names; one whose numbers are all 0 does not, and is not simulated."""
+        return self.effects.terms(self.n)
+
     @property
     def total_length(self) -> float:
         """The length of the straight chain, m."""
@@ -139,6 +96,10 @@ class Scene:
     def with_start(self, angles: npt.ArrayLike, rates: npt.ArrayLike) -> Scene:
         """The same scene from another start: angles (n,) rad, rates (n,) rad/s."""
         return dataclasses.replace(self, angles=cast(FloatArray, angles), rates=cast(FloatArray, rates))
+
+    def without(self, *effects: str) -> Scene:
+        """The same scene without these effects."""
+        return dataclasses.replace(self, effects=dataclasses.replace(self.effects, **dict.fromkeys(effects)))
 
     @property
     def digest(self) -> str:
@@ -175,7 +136,7 @@ def _counted(key: str, count: int) -> str:
 
 def _number(name: str, value: object, allowed: Range) -> float:
     try:
-        return allowed.number(value)
+        return allowed.read(value)
     except ValueError as error:
         raise InputError(f"{name} is {show(value)}; allowed: {error}") from None
 

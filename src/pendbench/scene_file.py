@@ -116,6 +116,10 @@ def read_scene(path: Path) -> Scene:
     for other, values in (("angles", start.angles), ("rates", start.rates)):
         if isinstance(values, list) and len(values) != n:
             raise input_error(f"{where} [start]", disagreement(other, len(values), key, n))
+    try:
+        file.effects.terms(n)
+    except InputError as error:
+        raise input_error(f"{where} [effects]", str(error)) from None
     name = printable(path.stem)
     return Scene(
         name=name,

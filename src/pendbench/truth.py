@@ -1,8 +1,9 @@
 """The truth for a scene, how well it is known, and until when.
 
 Two solves in double-double arithmetic that share neither formulation, nor order, nor steps: angles with the O(n)
-recursion at order 28, and unit vectors with tensions from a tridiagonal system at order 24. Where they agree, both are
-right; the time until which they do is the horizon.
+recursion at order 28, and unit vectors with tensions from a tridiagonal system at order 24; where more than gravity
+acts, a recursion for rods with mass, and the matrices of the equations of motion. Where the two agree, both are right;
+the time until which they do is the horizon.
 """
 
 from __future__ import annotations
@@ -126,14 +127,29 @@ def solve_vectors(scene: Scene, times: FloatArray) -> Iterator[FloatArray]:
 
 
 def _march(scene: Scene, times: FloatArray) -> Iterator[tuple[FloatArray, float]]:
-    """The angle form's state (2 n, 2) and its distance from the vector form's, at each time, as long as both go on."""
-    from pendbench.physics.extended import form_difference, with_whole_turns
+    """The first form's state (2 n, 2) and its distance from the second's, at each time, as long as both go on."""
+    from pendbench.physics.acting import is_plain
     from pendbench.physics.geometry import distance
 
+    pairs = _plain_pairs(scene, times) if is_plain(scene) else _pairs_with_effects(scene, times)
+    for state, difference in pairs:
+        yield state, float(distance(scene.lengths, state[: scene.n, 0], difference))
+
+
+def _plain_pairs(scene: Scene, times: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+    from pendbench.physics.extended import form_difference, with_whole_turns
+
     for angles, vectors in zip(solve_angles(scene, times), solve_vectors(scene, times), strict=False):
-        difference = form_difference(angles, vectors)
-        apart = float(distance(scene.lengths, angles[: scene.n, 0], difference))
-        yield with_whole_turns(scene, angles), apart
+        yield with_whole_turns(scene, angles), form_difference(angles, vectors)
+
+
+def _pairs_with_effects(scene: Scene, times: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+    from pendbench.physics.extended_effects import dense_form, recursive_form
+
+    recursive = _solve(*recursive_form(scene), _COLUMNS[0], times)
+    dense = _solve(*dense_form(scene), _COLUMNS[1], times)
+    for state, other in zip(recursive, dense, strict=False):
+        yield state[: 2 * scene.n].copy(), (other - state)[: scene.n].sum(axis=1)
 
 
 def _rising(times: npt.ArrayLike) -> FloatArray:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from pendbench import __version__
-from pendbench.engines.protocol import AdaptiveSimulation, Method, Setting, Simulation
+from pendbench.engines.protocol import AdaptiveSimulation, Mapped, Method, Setting, Simulation
 from pendbench.scene import Scene
 
 _LIMITS: Final = {
@@ -17,15 +17,27 @@ _LIMITS: Final = {
 
 _TAYLOR: Final = "Taylor series, 4 orders and 0.9 for each digit of the tolerance; the order claimed is the default's"
 
+_GRAVITY: Final = frozenset({"gravity"})
+
 _METHODS: Final = {
     "adaptive": Method(order=8, adaptive=True, settings=_LIMITS, note="DOP853 with compensated summation"),
-    "taylor": Method(order=17, adaptive=True, settings=_LIMITS, note=_TAYLOR, dense=True),
+    "taylor": Method(order=17, adaptive=True, settings=_LIMITS, note=_TAYLOR, dense=True, effects=_GRAVITY),
     "rk4": Method(order=4, note="the classical Runge-Kutta method"),
     "euler": Method(order=1, note="semi-implicit Euler, the method of most engines for games"),
     "gauss4": Method(order=4, note="Gauss-Legendre collocation with two stages: implicit, symplectic"),
     "gauss6": Method(order=6, note="Gauss-Legendre collocation with three stages: implicit, symplectic"),
-    "rattle": Method(order=2, note="constrained Cartesian Stormer-Verlet: symplectic, for large n"),
-    "frame": Method(order=2, substeps=True, note="RATTLE in as many equal steps as the frame asks for"),
+    "rattle": Method(order=2, note="constrained Cartesian Stormer-Verlet: symplectic, for large n", effects=_GRAVITY),
+    "frame": Method(order=2, substeps=True, note="RATTLE in as many equal steps as needed", effects=_GRAVITY),
+}
+_FORCES: Final = "forces at the rods' ends in the recursion, by all methods but taylor, rattle and frame"
+_EFFECTS: Final = {
+    "gravity": Mapped("acceleration of the pivot in the recursion"),
+    "joint_damping": Mapped(_FORCES),
+    "joint_stiffness": Mapped(_FORCES),
+    "air_drag": Mapped("forces on the masses in the recursion, by all methods but taylor, rattle and frame"),
+    "rod_mass": Mapped("a recursion of its own, with inertias of two directions, by all methods but those three"),
+    "driven_pivot": Mapped("acceleration of the pivot in the recursion, by all methods but those three"),
+    "drive_torque": Mapped(_FORCES),
 }
 
 
@@ -34,13 +46,14 @@ class AnalyticEngine:
 
     name = "analytic"
     methods: Mapping[str, Method] = _METHODS
+    effects: Mapping[str, Mapped] = _EFFECTS
 
     def version(self) -> str:
         """The project's own."""
         return __version__
 
     def refuses(self, scene: Scene) -> str | None:  # noqa: ARG002
-        """Nothing: every scene is its own."""
+        """Nothing but effects that a method does not know."""
         return None
 
     def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation | AdaptiveSimulation:

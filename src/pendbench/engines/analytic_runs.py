@@ -162,7 +162,7 @@ class Gauss:
         self._taken, self._stuck = 0, False
         self._q, self._p = scene.angles.copy(), np.empty(scene.n)
         self._rates = scene.rates.copy()
-        canonical.write_momenta(self._system, self._q, self._rates, self._p)
+        canonical.momenta_of(self._system, self._q, self._rates, self._p)
         self._carry, self._slopes = np.zeros((2, scene.n)), np.zeros((2, stages, scene.n))
         self._slopes[0] = self._rates
 
@@ -177,7 +177,7 @@ class Gauss:
         self._taken += taken
         self._stuck = taken < steps
         if steps:
-            canonical.write_rates(self._system, self._q, self._p, self._rates)
+            canonical.rates_of(self._system, self._q, self._p, self._rates)
 
     def state(self) -> State:
         """The state now."""

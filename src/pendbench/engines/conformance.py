@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Simulation, State
+from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Simulation, State, refusal
 from pendbench.engines.registry import flaw_of
 from pendbench.errors import describe
 from pendbench.physics.geometry import wrapped
@@ -99,9 +99,9 @@ def _disordered(sign: float = 1.0, masses: float = 1.0) -> Scene:
 
 
 def _build(engine: Engine, scene: Scene, method: str, dt: float = _DT, **settings: float) -> Run:
-    refusal = engine.refuses(scene)
-    if refusal is not None:
-        raise ValueError(f"refused a plain chain of {scene.n}: {refusal}")
+    refused = refusal(engine, method, scene)
+    if refused is not None:
+        raise ValueError(f"refused a plain chain of {scene.n}: {refused}")
     adaptive = engine.methods[method].adaptive
     run = engine.build(scene, method, None if adaptive else dt, **settings)
     if not isinstance(run, AdaptiveSimulation if adaptive else Simulation):

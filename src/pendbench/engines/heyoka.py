@@ -21,7 +21,7 @@ from typing import Any, Final
 
 import heyoka as hy
 
-from pendbench.engines.protocol import AdaptiveSimulation, Fault, Method, Setting, State
+from pendbench.engines.protocol import AdaptiveSimulation, Fault, Mapped, Method, Setting, State
 from pendbench.scene import Scene
 
 _TOLERANCE: Final = sys.float_info.epsilon  # heyoka's own default
@@ -38,7 +38,7 @@ _SETTINGS: Final = {
 }
 _NOTE: Final = "Taylor series of order ceil(1 - ln(tolerance) / 2); the order claimed is that of the default tolerance"
 _METHODS: Final = {"taylor": Method(taylor_order(_TOLERANCE), adaptive=True, settings=_SETTINGS, note=_NOTE)}
-_EFFECTS: Final = frozenset({"gravity"})
+_EFFECTS: Final = {"gravity": Mapped("in the equations of motion")}
 _MOST_LINKS: Final = 200  # 15 s to compile, on a busy machine
 _MOST_UNROLLED: Final = 11_000  # n (order^2 + n): unrolled code takes about a millisecond of compiling for each
 
@@ -128,15 +128,14 @@ class HeyokaEngine:
 
     name = "heyoka"
     methods: Mapping[str, Method] = _METHODS
+    effects: Mapping[str, Mapped] = _EFFECTS
 
     def version(self) -> str:
         """The version of heyoka itself."""
         return str(hy.__version__)
 
     def refuses(self, scene: Scene) -> str | None:
-        """Chains that take too long to compile, and effects that this adapter does not translate."""
-        if foreign := sorted(set(scene.effects.named()) - _EFFECTS):
-            return f"the adapter has no {foreign[0]}"
+        """Chains that take too long to compile."""
         if scene.n > _MOST_LINKS:
             return f"{scene.n} links; compiling the series of more than {_MOST_LINKS} takes too long"
         return None

@@ -14,13 +14,14 @@ import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.errors import InputError, printable
+from pendbench.physics import acting
 from pendbench.scene import Scene
 
 #: The compiler refuses anything smaller (probed with MuJoCo 4.0.0).
@@ -30,7 +31,18 @@ DEEPEST_FILE: Final = 496
 
 #: Swinging in the plane x-z, counter-clockwise positive for someone who has x to the right and z up.
 _AXIS: Final = (0.0, -1.0, 0.0)
-_DISABLED: Final = ("constraint", "contact", "spring", "damper", "actuation", "sensor", "autoreset")
+_DISABLED: Final = ("constraint", "contact", "spring", "damper", "actuation", "sensor", "autoreset", "gravity")
+# What an effect needs of these. Without springs and dampers MuJoCo does not ask for a user's passive forces either.
+_FLAGS: Final = {
+    "gravity": ("gravity",),
+    "joint_damping": ("damper",),
+    "joint_stiffness": ("spring",),
+    "air_drag": ("spring", "damper"),
+    "drive_torque": ("spring", "damper"),
+    "driven_pivot": ("gravity", "spring", "damper"),
+}
+#: The effects that no model can hold: they want forces that are computed while it runs.
+FORCED: Final = ("air_drag", "driven_pivot", "drive_torque")
 _FILE_DT: Final = 1e-3
 # What MuJoCo sets aside by itself is too little for its implicit integrators from some 500 links on; 200 n^2 is enough.
 _MEMORY: Final = (16_000_000, 256)
@@ -65,7 +77,8 @@ def _ignore(text: str) -> None:
 def chain_spec(scene: Scene) -> mujoco.MjSpec:
     """The chain as a MuJoCo model that can be edited further; `compile_chain` makes point masses of it.
 
-    A body's frame is at its joint, so that joint angles are those between neighbouring rods, 0 for a hanging chain.
+    What a model cannot hold (`FORCED`) is left to the adapter. A body's frame is at its joint, so that joint angles are
+    those between neighbouring rods, 0 for a hanging chain.
     """
     spec = mujoco.MjSpec()
     spec.modelname = printable(scene.name)
@@ -73,26 +86,30 @@ def chain_spec(scene: Scene) -> mujoco.MjSpec:
     spec.memory = _MEMORY[0] + _MEMORY[1] * scene.n**2
     spec.option.disableflags = sum(int(_flag(name)) for name in _disabled(scene))
     body, hangs_at = spec.worldbody, 0.0
-    for i, (mass, length) in enumerate(zip(_scaled_masses(scene), scene.lengths, strict=True), start=1):
+    for i, link in enumerate(_links(scene), start=1):
         body = body.add_body(
             name=f"link{i}",
             pos=(0.0, 0.0, -hangs_at),
-            mass=mass,
-            ipos=(0.0, 0.0, -length),
-            inertia=(INERTIA, INERTIA, INERTIA),
+            mass=link.mass,
+            ipos=(0.0, 0.0, -link.centre),
+            inertia=[link.inertia + INERTIA] * 3,
             explicitinertial=True,
         )
-        body.add_joint(name=f"joint{i}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=_AXIS)
-        hangs_at = length
+        kind, damping, stiffness = mujoco.mjtJoint.mjJNT_HINGE, link.damping, link.stiffness
+        body.add_joint(name=f"joint{i}", type=kind, axis=_AXIS, damping=[damping], stiffness=[stiffness])
+        hangs_at = link.length
     return spec
 
 
 def compile_chain(scene: Scene) -> mujoco.MjModel:
-    """The chain as a compiled model of point masses. What MuJoCo warns about here it counts again at the first step."""
+    """The chain as a compiled model, of point masses but for the rods' own inertia.
+
+    What MuJoCo warns about here it counts again at the first step.
+    """
     with quiet(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         model = chain_spec(scene).compile()
-    model.body_inertia[1:] = 0.0
+    model.body_inertia[1:] = [[link.inertia] * 3 for link in _links(scene)]
     return model
 
 
@@ -106,10 +123,12 @@ def write_mjcf(scene: Scene) -> str:
 
     MuJoCo's own writer keeps six digits, too few for the same motion; here every number reads back as it was.
 
-    Raises `InputError` for chains of more than `DEEPEST_FILE` links.
+    Raises `InputError` for chains of more than `DEEPEST_FILE` links and for effects that no file can hold (`FORCED`).
     """
     if scene.n > DEEPEST_FILE:
         raise InputError(f"scene {scene.name!r} has {scene.n} links; allowed in an MJCF file: at most {DEEPEST_FILE}")
+    if forced := [name for name in FORCED if name in scene.terms]:
+        raise InputError(f"scene {scene.name!r} calls for {forced[0]}, which an MJCF file cannot hold")
     root = ET.Element("mujoco", model=printable(scene.name))
     root.append(ET.Comment(_COMMENT))
     _add_options(root, scene)
@@ -119,6 +138,11 @@ def write_mjcf(scene: Scene) -> str:
     ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="start", qpos=qpos, qvel=qvel)
     ET.indent(root, space=" ")
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def fits_file(scene: Scene) -> bool:
+    """Whether `write_mjcf` can write the scene."""
+    return scene.n <= DEEPEST_FILE and not set(FORCED) & scene.terms.keys()
 
 
 def _add_options(root: ET.Element, scene: Scene) -> None:
@@ -132,13 +156,17 @@ def _add_options(root: ET.Element, scene: Scene) -> None:
 
 def _add_links(parent: ET.Element, scene: Scene) -> None:
     hangs_at = 0.0
-    for i, (mass, length) in enumerate(zip(_scaled_masses(scene), scene.lengths, strict=True), start=1):
+    for i, link in enumerate(_links(scene), start=1):
         parent = ET.SubElement(parent, "body", name=f"link{i}", pos=_text((0.0, 0.0, -hangs_at)))
-        inertial = {"pos": _text((0.0, 0.0, -length)), "mass": _text([mass]), "diaginertia": _text([INERTIA] * 3)}
+        inertia = _text([link.inertia + INERTIA] * 3)
+        inertial = {"pos": _text((0.0, 0.0, -link.centre)), "mass": _text([link.mass]), "diaginertia": inertia}
         ET.SubElement(parent, "inertial", inertial)
-        ET.SubElement(parent, "joint", name=f"joint{i}", axis=_text(_AXIS))
-        ET.SubElement(parent, "geom", fromto=_text((0.0, 0.0, 0.0, 0.0, 0.0, -length)))
-        hangs_at = length
+        joint = ET.SubElement(parent, "joint", name=f"joint{i}", axis=_text(_AXIS))
+        for name in ("damping", "stiffness"):
+            if value := getattr(link, name):
+                joint.set(name, _text([value]))
+        ET.SubElement(parent, "geom", fromto=_text((0.0, 0.0, 0.0, 0.0, 0.0, -link.length)))
+        hangs_at = link.length
 
 
 def _text(numbers: Iterable[float]) -> str:
@@ -146,15 +174,48 @@ def _text(numbers: Iterable[float]) -> str:
     return " ".join(repr(float(number) + 0.0) for number in numbers)  # + 0.0: no "-0.0"
 
 
-def _scaled_masses(scene: Scene) -> FloatArray:
-    """Masses (n,) of which the smallest is at least 1, and the smallest m l^2 too. A power of two changes no digit."""
+class _Link(NamedTuple):
+    """One body and its joint, in MuJoCo's unit of mass: centre m from the joint, inertia about the centre."""
+
+    length: float
+    mass: float
+    centre: float
+    inertia: float
+    damping: float
+    stiffness: float
+
+
+def mass_unit(scene: Scene) -> float:
+    """What masses, inertias and torques are multiplied with: a power of two, which changes no digit.
+
+    It makes the smallest mass at least 1, and the smallest m l^2 too.
+    """
     smallest = min(scene.masses.min(), (scene.masses * scene.lengths**2).min())
-    return scene.masses * 2.0 ** math.ceil(-math.log2(smallest))
+    return float(2.0 ** math.ceil(-math.log2(smallest)))
+
+
+def _links(scene: Scene) -> list[_Link]:
+    unit, rods = mass_unit(scene), acting.rods(scene)
+    masses = scene.masses + rods
+    centres = scene.lengths * ((scene.masses + 0.5 * rods) / masses)
+    # Of the point, of the rod, and of the two against each other.
+    apart = scene.masses * (rods / masses) * (0.5 * scene.lengths) ** 2
+    inertias = rods * scene.lengths**2 / 12.0 + apart
+    damping, stiffness = (_each(scene, name) for name in ("joint_damping", "joint_stiffness"))
+    columns = (scene.lengths, unit * masses, centres, unit * inertias, unit * damping, unit * stiffness)
+    return [_Link(*row) for row in np.stack(columns, axis=1).tolist()]
+
+
+def _each(scene: Scene, effect: str) -> FloatArray:
+    """An effect's number for each joint (n,), 0 where the scene does not call for it."""
+    value = getattr(scene.effects, effect)
+    return np.broadcast_to(np.asarray(0.0 if value is None else value), (scene.n,))
 
 
 def _disabled(scene: Scene) -> tuple[str, ...]:
     """What the scene does not call for, by the names that MJCF has for it."""
-    return _DISABLED if scene.effects.gravity is not None else (*_DISABLED, "gravity")
+    needs = {flag for name, flags in _FLAGS.items() if name in scene.terms for flag in flags}
+    return tuple(flag for flag in _DISABLED if flag not in needs)
 
 
 def _flag(name: str) -> mujoco.mjtDisableBit:
@@ -169,7 +230,7 @@ def main() -> None:
     folder = bundled("models") / "mjcf"
     folder.mkdir(exist_ok=True)
     for scene in map(load_scene, bundled_names("models")):
-        if scene.n <= DEEPEST_FILE:
+        if fits_file(scene):
             (folder / f"{scene.name}.xml").write_text(write_mjcf(scene), encoding="utf-8", newline="\n")
 
 

@@ -9,22 +9,34 @@ import mujoco
 import numpy as np
 
 from pendbench.engines.mjcf import compile_chain, joint_values, quiet
-from pendbench.engines.protocol import Fault, Method, Simulation, State
+from pendbench.engines.mujoco_forces import applied_forces
+from pendbench.engines.protocol import Fault, Mapped, Method, Simulation, State
 from pendbench.scene import Scene
 
 _INTEGRATORS: Final = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "euler_explicit": mujoco.mjtIntegrator.mjINT_EULER,
     "rk4": mujoco.mjtIntegrator.mjINT_RK4,
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
 _METHODS: Final = {
-    "euler": Method(order=1, note="semi-implicit Euler, MuJoCo's default"),
+    "euler": Method(order=1, note="semi-implicit Euler, MuJoCo's default: implicit in the joints' damping"),
+    "euler_explicit": Method(order=1, note="the same with damping taken as it is at the start of the step"),
     "rk4": Method(order=4, note="the classical Runge-Kutta method"),
     "implicit": Method(order=1, note="Euler, implicit in forces that depend on velocity"),
     "implicitfast": Method(order=1, note="as implicit, without the Coriolis forces: Euler, where nothing is damped"),
 }
-_EFFECTS: Final = frozenset({"gravity"})
+_CALLBACK: Final = "computed by a passive-force callback in Python, at every stage of a step"
+_EFFECTS: Final = {
+    "gravity": Mapped("gravity of the model"),
+    "joint_damping": Mapped("damping of the joints"),
+    "joint_stiffness": Mapped("stiffness of the joints"),
+    "air_drag": Mapped(f"force on the masses, {_CALLBACK}; its own fluid model is another law"),
+    "rod_mass": Mapped("mass, centre and inertia of the bodies"),
+    "driven_pivot": Mapped(f"gravity of the pivot's frame, {_CALLBACK}"),
+    "drive_torque": Mapped(f"torque in the joint, {_CALLBACK}"),
+}
 
 # Limits found with MuJoCo 4.0.0. A deeper chain is refused by its compiler; an offset of 1e-7 m is taken for none, and
 # the motion is wrong without a word.
@@ -44,10 +56,13 @@ class _Run:
         self._data.qpos[:] = joint_values(scene.angles)
         self._data.qvel[:] = joint_values(scene.rates)
         self._taken = 0
+        if method == "euler_explicit":
+            self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+        self._forces = applied_forces(scene)
 
     def advance(self, steps: int) -> None:
         self._taken += steps
-        with quiet():
+        with quiet(), self._forces:
             while steps > 0:
                 mujoco.mj_step(self._model, self._data, nstep=min(steps, _MOST_STEPS_A_CALL))
                 steps -= _MOST_STEPS_A_CALL
@@ -83,15 +98,14 @@ class MujocoEngine:
 
     name = "mujoco"
     methods: Mapping[str, Method] = _METHODS
+    effects: Mapping[str, Mapped] = _EFFECTS
 
     def version(self) -> str:
         """The version of MuJoCo itself."""
         return str(mujoco.__version__)
 
     def refuses(self, scene: Scene) -> str | None:
-        """Chains that its compiler refuses or takes for others, and effects that this adapter does not translate."""
-        if foreign := sorted(set(scene.effects.named()) - _EFFECTS):
-            return f"the adapter has no {foreign[0]}"
+        """Chains that its compiler refuses or takes for others."""
         if scene.n > _MOST_LINKS:
             return f"{scene.n} links; MuJoCo compiles chains of at most {_MOST_LINKS} bodies"
         if scene.lengths.min() < _SHORTEST:

@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import Fault, Method, Simulation, State
+from pendbench.engines.protocol import Fault, Mapped, Method, Simulation, State
 from pendbench.scene import Scene
 
 _NOTE: Final = "in Python around pinocchio.aba: Pinocchio has no integrator of its own"
@@ -29,7 +29,7 @@ _METHODS: Final = {
     "rk4": Method(order=4, note=f"the classical Runge-Kutta method, {_NOTE}"),
     "euler": Method(order=1, note=f"semi-implicit Euler, {_NOTE}"),
 }
-_EFFECTS: Final = frozenset({"gravity"})
+_EFFECTS: Final = {"gravity": Mapped("gravity of the model")}
 
 # Pinocchio's data holds tensors of second derivatives, 32 n^3 bytes, whether or not they are asked for. Measured:
 # 37 MB at 100 links, 264 MB at 200, 858 MB at 300. Each process of a study holds one at a time.
@@ -104,15 +104,14 @@ class PinocchioEngine:
 
     name = "pinocchio"
     methods: Mapping[str, Method] = _METHODS
+    effects: Mapping[str, Mapped] = _EFFECTS
 
     def version(self) -> str:
         """The version of Pinocchio itself."""
         return str(pin.__version__)
 
     def refuses(self, scene: Scene) -> str | None:
-        """Chains that take too much memory, and effects that this adapter does not translate."""
-        if foreign := sorted(set(scene.effects.named()) - _EFFECTS):
-            return f"the adapter has no {foreign[0]}"
+        """Chains that take too much memory."""
         if scene.n > _MOST_LINKS:
             return f"{scene.n} links; Pinocchio takes 32 n^3 bytes, too much memory for more than {_MOST_LINKS}"
         return None

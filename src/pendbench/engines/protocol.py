@@ -37,11 +37,25 @@ class Setting:
 
 
 @dataclass(frozen=True)
+class Mapped:
+    """What an engine does with an effect.
+
+    how: by what means it simulates it, or why it refuses to, in a few words for the documentation. orders: the order of
+    convergence that is left, by method, where the means lower it.
+    """
+
+    how: str
+    orders: Mapping[str, int] = field(default_factory=dict)
+    refused: bool = False
+
+
+@dataclass(frozen=True)
 class Method:
     """One way an engine advances time.
 
     order: the order of convergence it claims. adaptive: it chooses its own steps and is built with dt None. dense: its
     steps give every state on the way, so several times can fall into one. substeps: it divides its step as it sees fit.
+    effects: those it can simulate, None for all of its engine.
     note: one line for the documentation.
     """
 
@@ -51,6 +65,7 @@ class Method:
     note: str = ""
     dense: bool = False
     substeps: bool = False
+    effects: frozenset[str] | None = None
 
     def with_defaults(self, given: Mapping[str, float]) -> dict[str, float]:
         """The settings `given`, and the defaults of those that are not; one without either is left out."""
@@ -87,7 +102,11 @@ class AdaptiveSimulation(Protocol):
 
 
 class Engine(Protocol):
-    """A program that can simulate scenes."""
+    """A program that can simulate scenes.
+
+    It may also have `effects`, a mapping of effects' names to `Mapped`: scenes with others are then refused for it, and
+    the documentation has them in its table. An engine without one decides for itself in `refuses`.
+    """
 
     name: str
     methods: Mapping[str, Method]
@@ -100,3 +119,17 @@ class Engine(Protocol):
 
     def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation | AdaptiveSimulation:
         """A run at time 0 in the scene's start. Never timed. `settings` holds only settings the method declares."""
+
+
+def refusal(engine: Engine, method: str, scene: Scene) -> str | None:
+    """Why the engine cannot simulate the scene with that method, or None."""
+    mapped: Mapping[str, Mapped] | None = getattr(engine, "effects", None)
+    known = engine.methods[method].effects
+    for name in scene.terms:
+        if mapped is not None and name not in mapped:
+            return f"the adapter has no {name}"
+        if mapped is not None and mapped[name].refused:
+            return f"no {name}: {mapped[name].how}"
+        if known is not None and name not in known:
+            return f"method {method!r} has no {name}"
+    return engine.refuses(scene)

@@ -16,7 +16,9 @@ import pymunk
 from pymunk import batch
 
 from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import Fault, Method, Setting, Simulation, State
+from pendbench.engines.protocol import Fault, Mapped, Method, Setting, Simulation, State
+from pendbench.engines.pymunk_forces import Forces
+from pendbench.physics import acting
 from pendbench.scene import Scene
 
 _MOST_ITERATIONS: Final = 100_000
@@ -34,7 +36,16 @@ _METHODS: Final = {
         note="joint errors corrected within a step, and positions and rates of one time",
     ),
 }
-_EFFECTS: Final = frozenset({"gravity"})
+_APPLIED: Final = "forces on the masses, computed in Python before each step"
+_EFFECTS: Final = {
+    "gravity": Mapped("gravity of the space"),
+    "joint_damping": Mapped(f"{_APPLIED}: its masses do not turn, so its rotary springs have nothing to hold"),
+    "joint_stiffness": Mapped(f"{_APPLIED}, for the same reason"),
+    "air_drag": Mapped(f"{_APPLIED}; its own damping of the space is another law"),
+    "rod_mass": Mapped("its masses are points on pins; a rod with inertia is a body that turns", refused=True),
+    "driven_pivot": Mapped("gravity of the pivot's frame, set before each step"),
+    "drive_torque": Mapped(_APPLIED),
+}
 _TORN: Final = 0.5
 _FIELDS: Final = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
 
@@ -68,6 +79,7 @@ class _Run:
         self._space.iterations = iterations
         if scene.effects.gravity is not None:
             self._space.gravity = (0.0, -scene.effects.gravity)
+        self._forces = None if acting.is_plain(scene) else Forces(scene, self._space, dt, tuned)
         self._hang(scene, tuned)
         self._buffer = batch.Buffer()
         self._taken = 0
@@ -93,7 +105,9 @@ class _Run:
 
     def advance(self, steps: int) -> None:
         step, dt = self._space.step, self._dt
-        for _ in range(steps):  # pymunk has no call for many steps: this loop is what its users pay
+        for taken in range(self._taken, self._taken + steps):  # pymunk has no call for many: this is what its users pay
+            if self._forces is not None:
+                self._forces.apply(taken * dt)
             step(dt)
         self._taken += steps
 
@@ -139,15 +153,14 @@ class PymunkEngine:
 
     name = "pymunk"
     methods: Mapping[str, Method] = _METHODS
+    effects: Mapping[str, Mapped] = _EFFECTS
 
     def version(self) -> str:
         """The version of pymunk itself."""
         return str(pymunk.version)
 
-    def refuses(self, scene: Scene) -> str | None:
-        """Effects that this adapter does not translate."""
-        if foreign := sorted(set(scene.effects.named()) - _EFFECTS):
-            return f"the adapter has no {foreign[0]}"
+    def refuses(self, scene: Scene) -> str | None:  # noqa: ARG002
+        """Nothing but what `effects` says."""
         return None
 
     def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:

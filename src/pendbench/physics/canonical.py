@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pendbench.arrays import FloatArray
-from pendbench.compiled import inlined, specialise
-from pendbench.physics.system import System
+from pendbench.compiled import compiled, inlined, specialise
+from pendbench.physics import laws, massive
+from pendbench.physics.system import RodSystem, System
 from pendbench.physics.trigonometry import write_bends, write_directions
 from pendbench.solvers import problem
 
@@ -14,7 +17,7 @@ _P, _K = _X, _Y
 
 
 @inlined
-def _write_speeds(system: System, theta: FloatArray, omega: FloatArray) -> None:
+def _write_speeds(system: Any, theta: FloatArray, omega: FloatArray) -> None:
     """Leave the rods' directions and the masses' velocities in the scratch."""
     lengths, scratch = system.lengths, system.scratch
     write_directions(theta, scratch, _COSINE, _SINE)
@@ -27,7 +30,7 @@ def _write_speeds(system: System, theta: FloatArray, omega: FloatArray) -> None:
 
 
 @inlined
-def write_momenta(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
+def write_momenta(system: Any, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
     """Write p = C(theta) omega (n,) kg m^2/s into `out`: the momentum of the masses outside each rod, across it."""
     masses, lengths, scratch = system.masses, system.lengths, system.scratch
     _write_speeds(system, theta, omega)
@@ -39,8 +42,11 @@ def write_momenta(system: System, theta: FloatArray, omega: FloatArray, out: Flo
 
 
 @inlined
-def write_forces(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
-    """Write dL/dtheta (n,) N m into `out`: minus the outer momentum along each moving rod, and the weight's torque."""
+def write_forces(system: Any, t: float, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
+    """Write dL/dtheta (n,) N m into `out`, and what effects without a Lagrangian do.
+
+    dL/dtheta is minus the outer momentum along each moving rod, and the weight's torque.
+    """
     masses, lengths, scratch = system.masses, system.lengths, system.scratch
     _write_speeds(system, theta, omega)
     x, y, hanging = 0.0, 0.0, 0.0
@@ -50,6 +56,35 @@ def write_forces(system: System, theta: FloatArray, omega: FloatArray, out: Floa
         hanging += masses[i]
         s, c = scratch[_SINE, i], scratch[_COSINE, i]
         out[i] = -lengths[i] * (omega[i] * (s * x - c * y) + hanging * system.gravity * s)
+    if len(system.frames) + len(system.joints) + len(system.drags) > 0:
+        _add_effects(system, t, theta, omega, out)
+
+
+@inlined
+def _add_effects(system: Any, t: float, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
+    """Add what effects other than gravity do; the scratch holds the rods' directions and the masses' velocities."""
+    masses, lengths, scratch = system.masses, system.lengths, system.scratch
+    air_x, air_y = laws.pivot_velocity(system.frames, t)
+    shaken_x, shaken_y = laws.pivot_acceleration(system.frames, t)
+    drives = laws.drives(system.joints, t)
+    x, y, outer = 0.0, 0.0, 0.0
+    for i in range(len(masses) - 1, -1, -1):
+        drag_x, drag_y = laws.drag(system.drags, i, scratch[_X, i] + air_x, scratch[_Y, i] + air_y)
+        x += drag_x - masses[i] * shaken_x
+        y += drag_y - masses[i] * shaken_y
+        bend, rate = theta[i], omega[i]
+        if i > 0:
+            bend, rate = bend - theta[i - 1], rate - omega[i - 1]
+        torque = laws.joint_torque(system.joints, drives, i, bend, rate)
+        out[i] += torque - outer + lengths[i] * (scratch[_COSINE, i] * x + scratch[_SINE, i] * y)
+        outer = torque
+
+
+@inlined
+def _write_massive_momenta(system: RodSystem, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
+    write_momenta(system, theta, omega, out)
+    for i in range(len(out)):
+        out[i] += system.inertias[i] * omega[i]
 
 
 @inlined
@@ -86,11 +121,21 @@ def write_rates(system: System, theta: FloatArray, momenta: FloatArray, out: Flo
         radial, transverse = c * radial + s * q, c * q - s * radial
 
 
-@inlined
-def _write_force(system: System, t: float, q: FloatArray, v: FloatArray, f: FloatArray) -> None:  # noqa: ARG001
-    write_forces(system, q, v, f)
-
-
 specialise(problem.momentum, System, write_momenta)
 specialise(problem.velocity, System, write_rates)
-specialise(problem.generalized_force, System, _write_force)
+specialise(problem.generalized_force, System, write_forces)
+specialise(problem.momentum, RodSystem, _write_massive_momenta)
+specialise(problem.velocity, RodSystem, massive.write_rates)
+specialise(problem.generalized_force, RodSystem, write_forces)
+
+
+@compiled
+def momenta_of(system: Any, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
+    """Write the momenta (n,) kg m^2/s of any system into `out`."""
+    problem.momentum(system, theta, omega, out)
+
+
+@compiled
+def rates_of(system: Any, theta: FloatArray, momenta: FloatArray, out: FloatArray) -> None:
+    """Write the rates (n,) rad/s of any system into `out`."""
+    problem.velocity(system, theta, momenta, out)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pendbench.arrays import FloatArray
+from pendbench.physics import acting
 from pendbench.scene import Scene
 
 
@@ -19,8 +20,9 @@ def hanging_masses(masses: FloatArray) -> FloatArray:
 
 
 def mass_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
-    """C(theta), (n, n) kg m^2, symmetric and positive definite. theta: (n,) rad. equations.md (E7)."""
-    return _pair_inertias(scene) * np.cos(np.subtract.outer(theta, theta))
+    """C(theta), (n, n) kg m^2, symmetric and positive definite. theta: (n,) rad. equations.md (E7), (E36)."""
+    lumped = _pair_inertias(scene) * np.cos(np.subtract.outer(theta, theta))
+    return np.asarray(lumped + np.diag(acting.rod_inertias(scene)))
 
 
 def coupling_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
@@ -31,24 +33,25 @@ def coupling_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
     return _pair_inertias(scene) * -np.sin(np.subtract.outer(theta, theta))
 
 
-def gravity_torques(scene: Scene, theta: FloatArray) -> FloatArray:
-    """h(theta), (n,) N m; zero where the scene has no gravity. theta: (n,) rad. equations.md (E9)."""
-    if scene.effects.gravity is None:
-        return np.zeros(scene.n)
-    return scene.effects.gravity * hanging_masses(scene.masses) * scene.lengths * np.sin(theta)
+def weight_torques(scene: Scene, theta: FloatArray, t: float = 0.0) -> FloatArray:
+    """h(theta), (n,) N m: minus what gravity and a driven pivot do. theta: (n,) rad; t: s. equations.md (E9), (E37)."""
+    x, y = acting.pivot_acceleration(scene, t)
+    torques = hanging_masses(acting.lumped_masses(scene)) * scene.lengths
+    return np.asarray(torques * (y * np.sin(theta) + x * np.cos(theta)))
 
 
-def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    """Solve for theta'', (n,) rad/s^2: C theta'' = S omega^2 - h. theta: (n,) rad, omega: (n,) rad/s.
+def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float = 0.0) -> FloatArray:
+    """Solve for theta'', (n,) rad/s^2: C theta'' = S omega^2 - h + Q. theta: (n,) rad, omega: (n,) rad/s, t: s.
 
     Raises scipy.linalg.LinAlgError where rounding has left C without its positive definiteness (masses that differ
-    by many decades). equations.md (E6); the note's (14).
+    by many decades). equations.md (E6), (E40); the note's (14), which has no Q.
     """
-    torques = coupling_matrix(scene, theta) @ omega**2 - gravity_torques(scene, theta)
+    torques = coupling_matrix(scene, theta) @ omega**2 - weight_torques(scene, theta, t)
+    torques += acting.generalized_forces(scene, t, theta, omega)
     return np.asarray(cho_solve(cho_factor(mass_matrix(scene, theta)), torques))
 
 
 def _pair_inertias(scene: Scene) -> FloatArray:
     """M_max(i,j) l_i l_j, (n, n). M never grows outwards, so M_max(i,j) is the smaller of M_i and M_j."""
-    hanging = hanging_masses(scene.masses)
+    hanging = hanging_masses(acting.lumped_masses(scene))
     return np.asarray(np.minimum.outer(hanging, hanging) * np.outer(scene.lengths, scene.lengths))

@@ -10,16 +10,16 @@ import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
 from pendbench.errors import InputError
-from pendbench.physics import dense
+from pendbench.physics import acting, dense
 from pendbench.physics.geometry import positions, velocities
 from pendbench.scene import Scene, load_scene
 
 
 def energy(scene: Scene | str, theta: npt.ArrayLike, omega: npt.ArrayLike) -> FloatArray:
-    """Kinetic plus potential energy, (...,) J; the potential is zero at the pivot's height. equations.md (E3), (E4).
+    """Kinetic plus potential energy, (...,) J; that of the weight is zero at the pivot. equations.md (E3), (E4), (E41).
 
-    scene: a `Scene`, or the name or path of one. theta: (..., n) rad; omega: (..., n) rad/s. Raises InputError where
-    the two have other shapes than that.
+    Where the pivot is driven, this is the energy for someone who rides on it. scene: a `Scene`, or the name or path of
+    one. theta: (..., n) rad; omega: (..., n) rad/s. Raises InputError where the two have other shapes than that.
     """
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     theta, omega = np.asarray(theta, np.float64), np.asarray(omega, np.float64)
@@ -29,28 +29,32 @@ def energy(scene: Scene | str, theta: npt.ArrayLike, omega: npt.ArrayLike) -> Fl
 
 
 def kinetic_energy(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    """The masses' kinetic energy, (...,) J: a sum of squares, so it never cancels. equations.md (E3)."""
-    speeds_squared = np.sum(velocities(scene.lengths, theta, omega) ** 2, axis=-1)
-    return np.asarray(0.5 * np.sum(scene.masses * speeds_squared, axis=-1))
+    """That of masses and rods, (...,) J: a sum of squares, so it never cancels. equations.md (E3), (E36)."""
+    speeds = velocities(scene.lengths, theta, omega)
+    total = 0.5 * np.sum(scene.masses * np.sum(speeds**2, axis=-1), axis=-1)
+    rods = acting.rods(scene)
+    if rods.any():
+        inner = np.concatenate([np.zeros_like(speeds[..., :1, :]), speeds[..., :-1, :]], axis=-2)
+        middle = np.sum((0.5 * (speeds + inner)) ** 2, axis=-1)
+        total += 0.5 * np.sum(rods * (middle + (scene.lengths * omega) ** 2 / 12.0), axis=-1)
+    return np.asarray(total)
 
 
 def potential_energy(scene: Scene, theta: FloatArray) -> FloatArray:
-    """The masses' weight times their height above the pivot, (...,) J; zero without gravity. equations.md (E4)."""
-    if scene.effects.gravity is None:
-        return np.zeros(np.shape(theta)[:-1])
-    heights = positions(scene.lengths, theta)[..., 1]
-    return np.asarray(scene.effects.gravity * np.sum(scene.masses * heights, axis=-1))
+    """The weight's energy and that of the joints' springs, (...,) J; zero without either. equations.md (E4), (E41)."""
+    return acting.mass_potential(scene, positions(scene.lengths, theta)) + acting.joint_potential(scene, theta)
 
 
 def energy_scale(scene: Scene) -> float:
     """What energy drift is measured against, J. equations.md (E21).
 
-    The full range of the potential, or the initial kinetic energy where that is larger. It is 0 for a chain at rest
-    without gravity: no energy is at stake there, and a relative drift has no meaning.
+    The full range of the weight's potential, or the energy of motion and springs at the start where that is larger. It
+    is 0 for a chain at rest that nothing pulls at: no energy is at stake there, and a relative drift has no meaning.
     """
     gravity = scene.effects.gravity or 0.0
-    potential_range = 2.0 * gravity * float(dense.hanging_masses(scene.masses) @ scene.lengths)
-    return max(potential_range, float(kinetic_energy(scene, scene.angles, scene.rates)))
+    potential_range = 2.0 * gravity * float(dense.hanging_masses(acting.lumped_masses(scene)) @ scene.lengths)
+    springs = float(acting.joint_potential(scene, scene.angles))
+    return max(potential_range, float(kinetic_energy(scene, scene.angles, scene.rates)) + springs)
 
 
 def angular_momentum(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:

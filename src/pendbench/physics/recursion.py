@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
-from pendbench.compiled import inlined, specialise
+from pendbench.compiled import compiled, inlined, specialise
 from pendbench.errors import InputError
-from pendbench.physics.system import System
+from pendbench.physics import acting, forces, laws, massive
+from pendbench.physics.forces import FORCE_ACROSS, FORCE_ALONG
+from pendbench.physics.system import RodSystem, System, system_of
 from pendbench.physics.trigonometry import direction, write_bends
 from pendbench.scene import Scene
 from pendbench.solvers import problem
 from pendbench.solvers.copying import copy
+
+__all__ = ["accelerations", "inwards", "outwards", "system_of", "tensions", "write_accelerations"]
 
 # The rows of a system's scratch. Outwards, each link's tension takes the place of the cosine it no longer needs.
 _OWN, _PASSED, _ACROSS, _COSINE, _WHOLE = range(5)
@@ -24,7 +30,7 @@ _LOOK, _LARGE = 4, 1e20
 
 
 @inlined
-def inwards(system: System, theta: FloatArray, omega: FloatArray) -> tuple[float, float]:
+def inwards(system: System, t: float, theta: FloatArray, omega: FloatArray) -> tuple[float, float]:
     """Eliminate the chain from the tip to the pivot.
 
     Leaves in `system.scratch`, for each joint between rods i and i+1: the two parts of the mean
@@ -33,10 +39,14 @@ def inwards(system: System, theta: FloatArray, omega: FloatArray) -> tuple[float
     """
     masses, lengths, ratios = system.masses, system.lengths, system.ratios
     scratch = system.scratch
+    forced = len(system.joints) + len(system.drags) > 0
     write_bends(theta, scratch, _COSINE, _ACROSS)
     tip = len(masses) - 1
     # (E31): each link's division would have to wait for that of the link before it, so none is made until the end.
     whole, loose, moving = 1.0, 1.0, lengths[tip] * omega[tip] ** 2
+    if forced:
+        forces.write_forces(system, t, theta, omega, _COSINE, _ACROSS)
+        moving = moving + scratch[FORCE_ALONG, tip] * system.inverse_masses[tip]
     for last in range(tip, 0, -_LOOK):
         for i in range(last - 1, max(last - _LOOK, 0) - 1, -1):
             c, s = scratch[_COSINE, i], scratch[_ACROSS, i]
@@ -44,8 +54,16 @@ def inwards(system: System, theta: FloatArray, omega: FloatArray) -> tuple[float
             scratch[_ACROSS, i] = s * system.inverse_masses[i]
             heavier = ratios[i] * loose
             loose = heavier + s * s * whole
+            if forced:
+                along, across = scratch[FORCE_ALONG, i], scratch[FORCE_ACROSS, i]
+                scratch[_OWN, i] -= whole * (c * along + s * across)
+                pulling = (loose * along - c * s * whole * across) * system.inverse_masses[i]
+            else:
+                pulling = 0.0
             whole = whole + heavier
             moving = c * moving + lengths[i] * omega[i] ** 2 * whole
+            if forced:
+                moving = moving + pulling
             scratch[_WHOLE, i] = whole
         if whole > _LARGE:
             share = 1.0 / whole
@@ -60,81 +78,92 @@ def inwards(system: System, theta: FloatArray, omega: FloatArray) -> tuple[float
 
 
 @inlined
-def outwards(system: System, theta: FloatArray, alpha: float, beta: float, out: FloatArray) -> None:
+def outwards(system: System, t: float, theta: FloatArray, alpha: float, beta: float, out: FloatArray) -> None:
     """Carry the first rod's tension to the tip; write theta'' (n,) into `out`, and leave T (n,) in `system.scratch[3]`.
 
     Takes what `inwards` returned and left behind. Tensions, not accelerations, are carried: each is a mean of two with
     positive weights (but for the cosine), so a light mass between heavy ones costs no digits.
     """
     lengths, scratch = system.lengths, system.scratch
+    forced = len(system.joints) + len(system.drags) > 0
     c, s = direction(theta[0])
     tension = beta + alpha * system.gravity * c
     start = system.gravity * s  # how the inner end of the rod accelerates across it
+    if len(system.frames) > 0:
+        x, y = laws.pivot_acceleration(system.frames, t)
+        tension = tension + alpha * (c * y - s * x)
+        start = start + (c * x + s * y)
     for i in range(len(lengths)):
+        c = scratch[_COSINE, i]
         scratch[_TENSION, i] = tension
         following = scratch[_OWN, i] + scratch[_PASSED, i] * tension
         out[i] = (scratch[_ACROSS, i] * following - start) / lengths[i]
         start = scratch[_ACROSS, i] * tension
+        if forced:
+            pushed = scratch[FORCE_ACROSS, i] * system.inverse_masses[i]
+            out[i] += pushed / lengths[i]
+            start = start + (c * pushed - scratch[_ACROSS, i] * scratch[FORCE_ALONG, i])
         tension = following
 
 
 @inlined
-def write_accelerations(system: System, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
-    """Write theta'' (n,) rad/s^2 at theta (n,) rad, omega (n,) rad/s into `out`."""
-    alpha, beta = inwards(system, theta, omega)
-    outwards(system, theta, alpha, beta, out)
+def write_accelerations(system: System, t: float, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
+    """Write theta'' (n,) rad/s^2 at time t s, theta (n,) rad, omega (n,) rad/s into `out`."""
+    alpha, beta = inwards(system, t, theta, omega)
+    outwards(system, t, theta, alpha, beta, out)
 
 
 @inlined
-def _write_acceleration(system: System, t: float, q: FloatArray, v: FloatArray, a: FloatArray) -> None:  # noqa: ARG001
-    write_accelerations(system, q, v, a)
-
-
-@inlined
-def _write_derivative(system: System, t: float, y: FloatArray, dy: FloatArray) -> None:  # noqa: ARG001
+def _write_derivative(system: System, t: float, y: FloatArray, dy: FloatArray) -> None:
     n = len(system.masses)
     copy(y[n:], dy)
-    write_accelerations(system, y[:n], y[n:], dy[n:])
+    write_accelerations(system, t, y[:n], y[n:], dy[n:])
 
 
-specialise(problem.acceleration, System, _write_acceleration)
+@inlined
+def _write_massive_derivative(system: RodSystem, t: float, y: FloatArray, dy: FloatArray) -> None:
+    n = len(system.masses)
+    copy(y[n:], dy)
+    massive.write_accelerations(system, t, y[:n], y[n:], dy[n:])
+
+
+specialise(problem.acceleration, System, write_accelerations)
 specialise(problem.derivative, System, _write_derivative)
+specialise(problem.acceleration, RodSystem, massive.write_accelerations)
+specialise(problem.derivative, RodSystem, _write_massive_derivative)
 
 
-def system_of(scene: Scene) -> System:
-    """The scene's chain and effects, ready for the kernels."""
-    gravity = scene.effects.gravity
-    return System(
-        masses=np.array(scene.masses),
-        lengths=np.array(scene.lengths),
-        inverse_masses=1.0 / scene.masses,
-        ratios=scene.masses[:-1] / scene.masses[1:],
-        gravity=0.0 if gravity is None else float(gravity),
-        scratch=np.empty((5, scene.n)),
-    )
+@compiled
+def _accelerations(system: Any, t: float, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
+    problem.acceleration(system, t, theta, omega, out)
 
 
-def accelerations(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike) -> FloatArray:
-    """The angular accelerations theta'' (n,) rad/s^2 at theta (n,) rad and omega (n,) rad/s, in O(n).
+def accelerations(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float = 0.0) -> FloatArray:
+    """The angular accelerations theta'' (n,) rad/s^2 at theta (n,) rad, omega (n,) rad/s and t s, in O(n).
 
     Source: docs/equations.md, the recursion; the same system as `dense.accelerations`. Raises InputError where theta or
     omega does not have one number for each link.
     """
-    return _solved(scene, theta, omega)[0]
+    return _solved(scene, theta, omega, t)[0]
 
 
-def tensions(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike) -> FloatArray:
+def tensions(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float = 0.0) -> FloatArray:
     """The tension (n,) N in each rod at theta (n,) rad, omega (n,) rad/s; negative where the rod is compressed.
 
-    Source and errors as for `accelerations`, which get their values from these.
+    A joint's torque counts as the pair of forces that does the same (docs/equations.md). Source and errors as for
+    `accelerations`, which get their values from these. Raises InputError where rods have mass too: their tension is not
+    the same all along.
     """
-    return _solved(scene, theta, omega)[1]
+    if np.any(acting.rods(scene)):
+        raise InputError("rods have mass; allowed: massless rods, whose tension is the same all along")
+    return _solved(scene, theta, omega, t)[1]
 
 
-def _solved(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _solved(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float) -> tuple[FloatArray, FloatArray]:
     system, out = system_of(scene), np.empty(scene.n)
-    write_accelerations(system, _each_link("theta", theta, scene.n), _each_link("omega", omega, scene.n), out)
-    return out, system.scratch[3]
+    angles, rates = _each_link("theta", theta, scene.n), _each_link("omega", omega, scene.n)
+    _accelerations(system, float(t), angles, rates, out)
+    return out, system.scratch[_TENSION]
 
 
 def _each_link(name: str, values: npt.ArrayLike, n: int) -> FloatArray:

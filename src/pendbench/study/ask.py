@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pendbench.engines import protocol
 from pendbench.engines.registry import engine
 from pendbench.errors import describe, printable
 from pendbench.study.case import Case
@@ -10,7 +11,7 @@ from pendbench.study.case import Case
 def refusal(case: Case) -> str | None:
     """Why the engine cannot simulate the case's scene, or None. An engine that fails to say will fail to run, too."""
     try:
-        reason = engine(case.engine).refuses(case.scene)
+        reason = protocol.refusal(engine(case.engine), case.method, case.scene)
     except (Exception, SystemExit):
         return None
     return None if reason is None else printable(str(reason))

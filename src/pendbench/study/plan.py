@@ -17,7 +17,8 @@ from pendbench.bundled import bundled, bundled_names
 from pendbench.engines.protocol import Method
 from pendbench.engines.registry import engine
 from pendbench.errors import InputError, MissingEngineError, choose, printable
-from pendbench.scene import Range, Scene, load_scene
+from pendbench.ranges import Range
+from pendbench.scene import Scene, load_scene
 from pendbench.scene_file import Table, one_line_title
 from pendbench.strict import input_error, read_toml, show, shown_path, validate
 from pendbench.study.case import Case

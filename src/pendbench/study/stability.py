@@ -128,13 +128,17 @@ class _Stability:
 
     def _run(self, stage: str, cases: Sequence[Case]) -> None:
         jobs = {}
-        for case in cases:
+        for case in sorted(cases, key=self._effort, reverse=True):  # a long job begun last would leave workers idle
             duration = duration_of(self.plan, case.scene)
             content = (*case.content, duration, version(case.engine))
             jobs[case] = job_of(measure_stability, content, self.options.time_limit, case, duration)
         if jobs:
             values = self.runner.run(stage, list(jobs.values()), lambda _, fault: failed_stability(fault))
             self.found |= {case: values[job.key] for case, job in jobs.items()}
+
+    def _effort(self, case: Case) -> float:
+        """About how long a case takes, in links times steps; methods that choose their steps are quick."""
+        return 0.0 if case.dt is None else case.scene.n * duration_of(self.plan, case.scene) / case.dt
 
     def _search(self) -> None:
         """Halve, on a logarithmic scale, what lies between a step that holds and one that does not; find both first."""

@@ -1,0 +1,89 @@
+"""The effects that a scene can call for: one file each, and one line each in `Effects`.
+
+An effect's file holds its parameters with their checks, and its term: a NamedTuple of the numbers it needs, with the
+laws that say what it does. The laws are written once, for one joint or one mass, in plain arithmetic; numpy evaluates
+them for whole arrays in the dense form, the kernels of the recursion compile them, and the reference compiles them for
+numbers of 32 digits. `term.py` says which laws there are.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, ClassVar, get_args, get_type_hints
+
+from pendbench.effects.air_drag import AIR_DRAG, AirDrag, AirDragValue
+from pendbench.effects.drive_torque import DRIVE_TORQUE, DriveTorque, DriveTorqueValue
+from pendbench.effects.driven_pivot import DRIVEN_PIVOT, DrivenPivot, DrivenPivotValue
+from pendbench.effects.gravity import GRAVITY, Gravity
+from pendbench.effects.joint_damping import JOINT_DAMPING, JointDamping
+from pendbench.effects.joint_stiffness import JOINT_STIFFNESS, JointStiffness
+from pendbench.effects.rod_mass import ROD_MASS, RodMass
+from pendbench.effects.term import Term
+from pendbench.errors import InputError
+from pendbench.strict import show
+
+Each = float | tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Effects:
+    """What acts on the chain. None: the scene does not call for it, and nothing of it is simulated.
+
+    A field here is a key of the table [effects] of a scene file, with what its value may be and the class of its term;
+    the effect's file says what the value means. Values can be given as in a file: a list, a dict for a table.
+    Raises `InputError` for values that are not allowed. Effects can be compared and hashed.
+    """
+
+    __pydantic_config__: ClassVar[Any] = {"extra": "forbid"}
+    KEYS_ARE: ClassVar[str] = "effect"
+
+    gravity: Annotated[float, GRAVITY, Gravity] | None = None
+    joint_damping: Annotated[Each, JOINT_DAMPING, JointDamping] | None = None
+    joint_stiffness: Annotated[Each, JOINT_STIFFNESS, JointStiffness] | None = None
+    air_drag: Annotated[AirDragValue, AIR_DRAG, AirDrag] | None = None
+    rod_mass: Annotated[Each, ROD_MASS, RodMass] | None = None
+    driven_pivot: Annotated[DrivenPivotValue, DRIVEN_PIVOT, DrivenPivot] | None = None
+    drive_torque: Annotated[DriveTorqueValue, DRIVE_TORQUE, DriveTorque] | None = None
+
+    def __post_init__(self) -> None:
+        for name, (allowed, _) in _kinds().items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            try:
+                object.__setattr__(self, name, allowed.read(value))
+            except InputError as error:
+                raise InputError(f"{name}: {error}") from None
+            except ValueError as error:
+                raise InputError(f"{name} is {show(value)}; allowed: {error}") from None
+
+    def named(self) -> tuple[str, ...]:
+        """The names of the effects that the scene calls for."""
+        return tuple(field.name for field in dataclasses.fields(self) if getattr(self, field.name) is not None)
+
+    def terms(self, n: int) -> dict[str, Term]:
+        """What acts on a chain of n links, by name: the effects named but for those whose numbers are all 0.
+
+        Raises `InputError` where an effect does not fit a chain of n links.
+        """
+        terms = {name: _kinds()[name][1].of(getattr(self, name), n) for name in self.named()}
+        return {name: term for name, term in terms.items() if not term.is_nothing()}
+
+
+def names() -> tuple[str, ...]:
+    """The names of all effects there are."""
+    return tuple(_kinds())
+
+
+def term_classes() -> tuple[type[Any], ...]:
+    """The classes of their terms."""
+    return tuple(term for _, term in _kinds().values())
+
+
+@cache
+def _kinds() -> dict[str, tuple[Any, type[Any]]]:
+    """What reads each effect's value, and the class of its term."""
+    hints = get_type_hints(Effects, include_extras=True)
+    return {field.name: get_args(hints[field.name])[0].__metadata__ for field in dataclasses.fields(Effects)}

@@ -1,0 +1,57 @@
+"""A pivot that is shaken: r_0(t) = amplitude sin(w t) along one axis.
+
+Angles are those of the rods, and energy is that which the chain has for someone who rides on the pivot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, NamedTuple
+
+import numpy as np
+
+from pendbench.effects.table import OneOf, Parameters, TableOf
+from pendbench.ranges import Range
+
+
+@dataclass(frozen=True)
+class DrivenPivotValue(Parameters):
+    """axis "x" (to the right) or "y" (upwards); amplitude m; angular_frequency rad/s."""
+
+    axis: Annotated[str, OneOf(("x", "y"))]
+    amplitude: Annotated[float, Range(-1e50, 1e50, "m")]
+    angular_frequency: Annotated[float, Range(1e-50, 1e50, "rad/s")]
+
+
+DRIVEN_PIVOT: Final = TableOf(DrivenPivotValue)
+
+
+class DrivenPivot(NamedTuple):
+    """x and y: the amplitude's parts, m; frequency: rad/s."""
+
+    x: float
+    y: float
+    frequency: float
+
+    @classmethod
+    def of(cls, value: DrivenPivotValue, n: int) -> DrivenPivot:  # noqa: ARG003
+        """The term for a chain of n links."""
+        along_x = value.axis == "x"
+        x, y = (value.amplitude, 0.0) if along_x else (0.0, value.amplitude)
+        return cls(x, y, value.angular_frequency)
+
+    def is_nothing(self) -> bool:
+        """Whether it does nothing."""
+        return self.x == 0.0 == self.y
+
+    @staticmethod
+    def pivot_acceleration(term: DrivenPivot, t: Any) -> tuple[Any, Any]:
+        """The second derivative of r_0."""
+        factor = -(np.sin(term.frequency * t) * term.frequency * term.frequency)
+        return term.x * factor, term.y * factor
+
+    @staticmethod
+    def pivot_velocity(term: DrivenPivot, t: Any) -> tuple[Any, Any]:
+        """The first derivative of r_0."""
+        factor = np.cos(term.frequency * t) * term.frequency
+        return term.x * factor, term.y * factor

@@ -1,0 +1,31 @@
+"""Uniform rods with a mass of their own. Gravity pulls at them; the air does not hold them."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from pendbench.arrays import FloatArray
+from pendbench.effects.term import each
+from pendbench.ranges import EachOf, Range
+
+ROD_MASS: Final = EachOf(Range(0.0, 1e50, "kg"), "rod")
+
+
+class RodMass(NamedTuple):
+    """rods: (n,) kg."""
+
+    rods: FloatArray
+
+    @classmethod
+    def of(cls, value: float | tuple[float, ...], n: int) -> RodMass:
+        """The term for a chain of n links."""
+        return cls(each(value, n, "rod_mass", "rods"))
+
+    def is_nothing(self) -> bool:
+        """Whether it does nothing."""
+        return not self.rods.any()
+
+    @staticmethod
+    def rod_masses(term: RodMass) -> FloatArray:
+        """Of each rod."""
+        return term.rods

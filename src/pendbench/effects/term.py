@@ -1,0 +1,54 @@
+"""What an effect may add to the equations: the laws that its term can have. To add an effect, read this page.
+
+A term is a NamedTuple of floats and arrays (n,). The equations need two things of it:
+
+- `of(value, n)`: the term for a chain of n links, from the value in the scene; raises `InputError` if they do not fit.
+- `is_nothing()`: whether all its numbers are 0, so that it can be left out.
+
+and one or more of these laws, static methods in plain arithmetic (`+ - * /`, `np.sin`, `np.cos`, `np.sqrt`), which are
+compiled, and called with numpy arrays, and with numbers of 32 digits:
+
+- `pivot_acceleration(term, t)`: (x, y) m/s^2, what the pivot's acceleration against free fall is at time t s, and
+  `pivot_velocity(term, t)`: (x, y) m/s, with which the chain moves through the air.
+- `mass_potential(term, x, y)`: J/kg at (x, y) m from the pivot, where a constant acceleration has a potential; an
+  acceleration without one does work.
+- `joint_torque(term, drive, i, bend, rate)`: N m, what joint i feels, along its angle: on rod i, and against rod i - 1.
+  bend rad and rate rad/s: the rod's against the rod before it, or against the vertical for the first.
+- `joint_potential(term, i, bend)`: J, where the torque has one; a torque without one has a power.
+- `drag(term, i, x, y)`: (x, y) N, the force on mass i at velocity (x, y) m/s through the air. The law must look the
+  same from every direction: the recursion calls it in the rod's own frame, the dense form in that of the ground.
+- `drive(term, t)`: a number that the joint's law gets, the same for all joints, so that it is computed once.
+- `rod_masses(term)`: (n,) kg, of uniform rods.
+
+i is an index in a kernel and `...` for numpy, where bend, rate, x and y are arrays (..., n). An effect that pushes in
+none of these ways needs a law more, here and in `physics/laws.py`. Then add the effect's line to `Effects`, its row to
+the table in docs/effects.md, and to each engine that can simulate it (`effects` in its adapter); the others refuse it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from pendbench.arrays import FloatArray
+from pendbench.errors import InputError
+
+
+class Term(Protocol):
+    """What an effect adds to the equations of one chain."""
+
+    @classmethod
+    def of(cls, value: Any, n: int) -> Term:
+        """The term for a chain of n links. Raises `InputError` where the value does not fit them."""
+
+    def is_nothing(self) -> bool:
+        """Whether it does nothing: all its numbers are 0."""
+
+
+def each(values: float | tuple[float, ...], n: int, name: str, of: str) -> FloatArray:
+    """One number for each of n joints or rods (`of`), as (n,). Raises `InputError` for lists of other lengths."""
+    if isinstance(values, tuple) and len(values) != n:
+        count = f"{len(values)} {'entry' if len(values) == 1 else 'entries'}"
+        raise InputError(f"{name} has {count}; allowed: one number, or one for each of the {n} {of}")
+    return np.array(np.broadcast_to(np.asarray(values, dtype=np.float64), (n,)))

@@ -1,0 +1,54 @@
+"""The effects that MuJoCo has no means for: forces that a callback computes whenever it asks for passive forces.
+
+It asks in every stage of a step, with that stage's time and state, so the order of the method is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+
+import mujoco
+import numpy as np
+
+from pendbench.engines.mjcf import FORCED, mass_unit
+from pendbench.physics import acting
+from pendbench.scene import Scene
+
+Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
+
+
+def applied_forces(scene: Scene) -> AbstractContextManager[None]:
+    """A context, to be entered as often as wanted, in which MuJoCo adds these forces; an empty one where none act."""
+    return _Applied(_callback(scene)) if set(FORCED) & scene.terms.keys() else nullcontext()
+
+
+class _Applied(AbstractContextManager[None]):
+    """MuJoCo has one such callback for the whole process; the user's own is put back afterwards."""
+
+    def __init__(self, callback: Callback) -> None:
+        self._callback = callback
+        self._before: Callback | None = None
+
+    def __enter__(self) -> None:
+        self._before = mujoco.get_mjcb_passive()
+        mujoco.set_mjcb_passive(self._callback)
+
+    def __exit__(self, *_: object) -> None:
+        mujoco.set_mjcb_passive(self._before)
+
+
+def _callback(scene: Scene) -> Callback:
+    unit, shaken = mass_unit(scene), "driven_pivot" in scene.terms
+    forced = scene.without("joint_damping", "joint_stiffness")  # MuJoCo has these
+    pushed = "air_drag" in scene.terms or "drive_torque" in scene.terms
+
+    def apply(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        if shaken:
+            x, y = acting.pivot_acceleration(scene, data.time)
+            model.opt.gravity[:] = -x, 0.0, -y
+        if pushed:
+            torques = acting.generalized_forces(forced, data.time, np.cumsum(data.qpos), np.cumsum(data.qvel))
+            data.qfrc_passive[:] += unit * np.cumsum(torques[::-1])[::-1]
+
+    return apply

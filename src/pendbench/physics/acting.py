@@ -1,0 +1,141 @@
+"""The effects of a scene in matrices: their laws for whole arrays, and what the dense form, energy and power need.
+
+Arrays are (..., n); what depends on the time takes it as t s, a number or an array (...).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pendbench.arrays import FloatArray
+from pendbench.physics.geometry import velocities
+from pendbench.scene import Scene
+
+
+def _with(scene: Scene, law: str) -> list[Any]:
+    return [term for term in scene.terms.values() if hasattr(term, law)]
+
+
+def rods(scene: Scene) -> FloatArray:
+    """The rods' own masses (n,) kg."""
+    masses = [term.rod_masses(term) for term in _with(scene, "rod_masses")]
+    return np.asarray(np.sum([np.zeros(scene.n), *masses], axis=0))
+
+
+def lumped_masses(scene: Scene) -> FloatArray:
+    """The masses (n,) kg with half of each rod at each of its ends. equations.md (E36)."""
+    half = 0.5 * rods(scene)
+    return np.asarray(scene.masses + half + np.append(half[1:], 0.0))
+
+
+def rod_inertias(scene: Scene) -> FloatArray:
+    """What lumped rods have too much of on C's diagonal, (n,) kg m^2, negative. equations.md (E36)."""
+    return -rods(scene) * scene.lengths**2 / 6.0
+
+
+def bends(angles: FloatArray) -> FloatArray:
+    """Each rod's angle or rate (..., n) against the rod before it, the first's against the vertical."""
+    return np.diff(angles, axis=-1, prepend=0.0)
+
+
+def pivot_acceleration(scene: Scene, t: npt.ArrayLike) -> FloatArray:
+    """The pivot's acceleration against free fall, (..., 2) m/s^2. equations.md (E37)."""
+    return _pivot(_with(scene, "pivot_acceleration"), t)
+
+
+def pivot_velocity(scene: Scene, t: npt.ArrayLike) -> FloatArray:
+    """The pivot's velocity through the air, (..., 2) m/s. equations.md (E37)."""
+    return _pivot(_with(scene, "pivot_velocity"), t, "pivot_velocity")
+
+
+def _pivot(terms: list[Any], t: npt.ArrayLike, law: str = "pivot_acceleration") -> FloatArray:
+    t = np.asarray(t, np.float64)
+    total = np.zeros((*t.shape, 2))
+    for term in terms:
+        x, y = getattr(term, law)(term, t)
+        total[..., 0] += x
+        total[..., 1] += y
+    return total
+
+
+def joint_torques(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """The torque in each joint, (..., n) N m: on its rod, and the opposite on the rod before. equations.md (E38)."""
+    return _torques(_with(scene, "joint_torque"), t, theta, omega)
+
+
+def _torques(terms: list[Any], t: npt.ArrayLike, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    bend, rate, t = bends(theta), bends(omega), np.asarray(t, np.float64)
+    total = np.zeros(np.shape(theta))
+    for term in terms:
+        drive = term.drive(term, t)[..., np.newaxis] if hasattr(term, "drive") else 0.0
+        total += term.joint_torque(term, drive, ..., bend, rate)
+    return total
+
+
+def drag_forces(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """The air's force on each mass, (..., n, 2) N. equations.md (E39)."""
+    terms = _with(scene, "drag")
+    total = np.zeros((*np.shape(theta), 2))
+    if not terms:
+        return total
+    speed = velocities(scene.lengths, theta, omega) + pivot_velocity(scene, t)[..., np.newaxis, :]
+    for term in terms:
+        x, y = term.drag(term, ..., speed[..., 0], speed[..., 1])
+        total[..., 0] += x
+        total[..., 1] += y
+    return total
+
+
+def generalized_forces(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """What joints and air do to each rod's angle, (..., n) N m. equations.md (E40)."""
+    joints = joint_torques(scene, t, theta, omega)
+    outer = np.concatenate([joints[..., 1:], np.zeros_like(joints[..., :1])], axis=-1)
+    forces = drag_forces(scene, t, theta, omega)
+    pulled = np.cumsum(forces[..., ::-1, :], axis=-2)[..., ::-1, :]
+    across = np.cos(theta) * pulled[..., 0] + np.sin(theta) * pulled[..., 1]
+    return np.asarray(joints - outer + scene.lengths * across)
+
+
+def mass_forces(scene: Scene, t: float, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """The forces on the masses, (n, 2) N, that do what joints and air do to the chain. equations.md (E39), (E43)."""
+    joints = joint_torques(scene, t, theta, omega)
+    couples = (joints - np.append(joints[1:], 0.0)) / scene.lengths
+    pairs = couples[:, np.newaxis] * np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+    return np.asarray(drag_forces(scene, t, theta, omega) + pairs - np.append(pairs[1:], np.zeros((1, 2)), axis=0))
+
+
+def joint_potential(scene: Scene, theta: FloatArray) -> FloatArray:
+    """The energy in the joints, (...,) J. equations.md (E41)."""
+    bend = bends(theta)
+    parts = [term.joint_potential(term, ..., bend) for term in _with(scene, "joint_potential")]
+    return np.asarray(np.sum(parts, axis=(0, -1)) if parts else np.zeros(np.shape(theta)[:-1]))
+
+
+def power(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega: FloatArray) -> FloatArray:
+    """What the effects without a potential do, (...,) W: the rate of `energy`. equations.md (E42).
+
+    t: (...,) s; theta, omega: (..., n). A driven pivot does the work of the forces of inertia in its frame.
+    """
+    without = [term for term in _with(scene, "joint_torque") if not hasattr(term, "joint_potential")]
+    speed = velocities(scene.lengths, theta, omega)
+    shaking = _pivot([term for term in _with(scene, "pivot_acceleration") if not hasattr(term, "mass_potential")], t)
+    shaken = shaking[..., np.newaxis, :] * lumped_masses(scene)[:, np.newaxis]
+    forces = drag_forces(scene, t, theta, omega) - shaken
+    torques = _torques(without, t, theta, omega)
+    return np.asarray(np.sum(forces * speed, axis=(-1, -2)) + np.sum(torques * bends(omega), axis=-1))
+
+
+def mass_potential(scene: Scene, places: FloatArray) -> FloatArray:
+    """The weight's energy, (...,) J, with the masses at (..., n, 2) m from the pivot. equations.md (E4)."""
+    total = np.zeros(places.shape[:-1])
+    for term in _with(scene, "mass_potential"):
+        total += term.mass_potential(term, places[..., 0], places[..., 1])
+    return np.asarray(np.sum(lumped_masses(scene) * total, axis=-1))
+
+
+def is_plain(scene: Scene) -> bool:
+    """Whether nothing acts but gravity."""
+    return scene.terms.keys() <= {"gravity"}
