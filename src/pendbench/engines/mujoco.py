@@ -10,7 +10,7 @@ import numpy as np
 
 from pendbench.engines.mjcf import compile_chain, joint_values, quiet
 from pendbench.engines.mujoco_forces import applied_forces
-from pendbench.engines.protocol import Fault, Mapped, Method, Simulation, State
+from pendbench.engines.protocol import Fault, Mapped, Method, Setting, Simulation, State
 from pendbench.scene import Scene
 
 _INTEGRATORS: Final = {
@@ -20,12 +20,21 @@ _INTEGRATORS: Final = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
+_SETTINGS: Final = {
+    "default_flags": Setting(0, 0, 1, integer=True, note="1: what MuJoCo has on by itself is not turned off"),
+}
+
+
+def _method(order: int, note: str) -> Method:
+    return Method(order=order, settings=_SETTINGS, note=note)
+
+
 _METHODS: Final = {
-    "euler": Method(order=1, note="semi-implicit Euler, MuJoCo's default: implicit in the joints' damping"),
-    "euler_explicit": Method(order=1, note="the same with damping taken as it is at the start of the step"),
-    "rk4": Method(order=4, note="the classical Runge-Kutta method"),
-    "implicit": Method(order=1, note="Euler, implicit in forces that depend on velocity"),
-    "implicitfast": Method(order=1, note="as implicit, without the Coriolis forces: Euler, where nothing is damped"),
+    "euler": _method(1, "semi-implicit Euler, MuJoCo's default: implicit in the joints' damping"),
+    "euler_explicit": _method(1, "the same with damping taken as it is at the start of the step"),
+    "rk4": _method(4, "the classical Runge-Kutta method"),
+    "implicit": _method(1, "Euler, implicit in forces that depend on velocity"),
+    "implicitfast": _method(1, "as implicit, without the Coriolis forces: Euler, where nothing is damped"),
 }
 _CALLBACK: Final = "computed by a passive-force callback in Python, at every stage of a step"
 _EFFECTS: Final = {
@@ -48,8 +57,10 @@ _MOST_STEPS_A_CALL: Final = 2**30  # the count of a native call has 32 bits
 class _Run:
     """One chain in MuJoCo. Only joint angles and rates are read: all else in MjData lags a step behind."""
 
-    def __init__(self, scene: Scene, method: str, dt: float) -> None:
+    def __init__(self, scene: Scene, method: str, dt: float, default_flags: bool) -> None:
         self._model = compile_chain(scene)
+        if default_flags:
+            self._model.opt.disableflags = 0
         self._model.opt.integrator = _INTEGRATORS[method]
         self._model.opt.timestep = dt
         self._data = mujoco.MjData(self._model)
@@ -112,8 +123,8 @@ class MujocoEngine:
             return f"a rod of {scene.lengths.min():g} m; MuJoCo takes lengths near 1e-7 m for zero"
         return None
 
-    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:  # noqa: ARG002
-        """A run at time 0; no method has settings."""
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:
+        """A run at time 0."""
         if dt is None:
             raise ValueError(f"method {method!r} needs a step")
-        return _Run(scene, method, dt)
+        return _Run(scene, method, dt, default_flags=bool(settings.get("default_flags")))

@@ -305,6 +305,29 @@ _SCALING: Final = {
     "outcome": _text("outcome", "held, lost (energy or rods), too slow for real time, or a status", is_time=True),
 }
 
+_EFFECTS: Final = {
+    "effects": _text("effects", "what acts on the scene's chain"),
+    "effect": _text("effect", "the effect; in prices.csv what acts besides gravity"),
+    "means": _text("means", "by what means the engine simulates the effect, or why it refuses to"),
+    "balance_error": Column(
+        "1",
+        ".1e",
+        "energy balance",
+        "the largest difference between the energy's change and the work of the effects without a potential, over the "
+        "scene's energy (or the largest change, where that is larger)",
+    ),
+    "balance_floor": Column(
+        "1", ".0e", "its floor", "how well the work is known from the samples: a balance below this is not told from 0"
+    ),
+    "moved_max_rad": Column("rad", ".3g", "moved by, rad", "the farthest that any angle gets from where it started"),
+    "step_price": Column(
+        "1", ".2f", "price", "the cost of a step over that of the bare chain, under gravity alone", is_time=True
+    ),
+    "price_spread": Column(
+        "1", ".2f", "its spread", "largest less smallest of three measurements of the price in turn", is_time=True
+    ),
+}
+
 _ENSEMBLE: Final = {
     "chains": Column("1", "d", "chains", "how many chains were run"),
     "pixels": Column("1", "d", "pixels", "how many pixels of the map are compared (in maps.csv: it has)"),
@@ -371,6 +394,8 @@ COLUMNS: Final = MappingProxyType(
         **_STABILITY,
         **_COSTS,
         **_SCALING,
+        **_EFFECTS,
+        **_EFFECTS,
         **_ENSEMBLE,
     }
 )

@@ -17,6 +17,7 @@ PAGES: Final = {
     "stability": "pendbench.report.stability",
     "scaling": "pendbench.report.scaling",
     "ensemble": "pendbench.report.ensemble",
+    "effects": "pendbench.report.effects",
 }
 
 _PLAIN: Final = "pendbench.report.plain"

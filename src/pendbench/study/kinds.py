@@ -18,6 +18,7 @@ KINDS: Final = {
     "stability": "pendbench.study.stability",
     "ensemble": "pendbench.study.ensemble",
     "scaling": "pendbench.study.scaling",
+    "effects": "pendbench.study.effects",
 }
 
 
