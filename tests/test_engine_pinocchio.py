@@ -138,12 +138,6 @@ def test_memory_grows_as_the_refusal_says():
     assert 30 < int(told.stdout) / 150**3 < 45
 
 
-def test_refuses_an_effect_that_it_does_not_know():
-    damped = dataclasses.replace(chain(2), effects=Effects(gravity=9.81, joint_damping=0.1))
-    assert refusal(ENGINE, "rk4", chain(2)) is None
-    assert refusal(ENGINE, "rk4", damped) == "the adapter has no joint_damping"
-
-
 # What goes wrong.
 
 

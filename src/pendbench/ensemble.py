@@ -18,6 +18,7 @@ import numpy.typing as npt
 from pendbench.arrays import FloatArray
 from pendbench.connect import LOCAL, connected
 from pendbench.errors import InputError, choose, printable
+from pendbench.processes import processors
 from pendbench.scene import ANGLE, RATE, Scene, load_scene
 from pendbench.strict import show
 
@@ -254,7 +255,7 @@ def _times(times: npt.ArrayLike | None, duration: float) -> FloatArray:
 
 def _workers(threads: int | None) -> int:
     if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return processors()
     if type(threads) is not int or not 1 <= threads <= 1024:
         raise InputError(f"threads is {show(threads)}; allowed: 1 to 1024")
     return threads

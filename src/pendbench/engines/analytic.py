@@ -29,14 +29,14 @@ _METHODS: Final = {
     "rattle": Method(order=2, note="constrained Cartesian Stormer-Verlet: symplectic, for large n", effects=_GRAVITY),
     "frame": Method(order=2, substeps=True, note="RATTLE in as many equal steps as needed", effects=_GRAVITY),
 }
-_FORCES: Final = "forces at the rods' ends in the recursion, by all methods but taylor, rattle and frame"
+_FORCES: Final = "forces at the rods' ends in the recursion"
 _EFFECTS: Final = {
     "gravity": Mapped("acceleration of the pivot in the recursion"),
     "joint_damping": Mapped(_FORCES),
     "joint_stiffness": Mapped(_FORCES),
-    "air_drag": Mapped("forces on the masses in the recursion, by all methods but taylor, rattle and frame"),
-    "rod_mass": Mapped("a recursion of its own, with inertias of two directions, by all methods but those three"),
-    "driven_pivot": Mapped("acceleration of the pivot in the recursion, by all methods but those three"),
+    "air_drag": Mapped("forces on the masses in the recursion"),
+    "rod_mass": Mapped("a recursion of its own, with inertias of two directions"),
+    "driven_pivot": Mapped("acceleration of the pivot in the recursion"),
     "drive_torque": Mapped(_FORCES),
 }
 

@@ -22,6 +22,7 @@ import pinocchio as pin
 
 from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault, Mapped, Method, Simulation, State
+from pendbench.physics import acting
 from pendbench.scene import Scene
 
 _NOTE: Final = "in Python around pinocchio.aba: Pinocchio has no integrator of its own"
@@ -29,7 +30,16 @@ _METHODS: Final = {
     "rk4": Method(order=4, note=f"the classical Runge-Kutta method, {_NOTE}"),
     "euler": Method(order=1, note=f"semi-implicit Euler, {_NOTE}"),
 }
-_EFFECTS: Final = {"gravity": Mapped("gravity of the model")}
+_TORQUES: Final = "torques in the joints, computed in Python at every stage of a step"
+_EFFECTS: Final = {
+    "gravity": Mapped("gravity of the model"),
+    "joint_damping": Mapped(_TORQUES),
+    "joint_stiffness": Mapped(_TORQUES),
+    "air_drag": Mapped(_TORQUES),
+    "rod_mass": Mapped("mass, lever and inertia of the bodies"),
+    "driven_pivot": Mapped("gravity of the pivot's frame, set at every stage of a step"),
+    "drive_torque": Mapped(_TORQUES),
+}
 
 # Pinocchio's data holds tensors of second derivatives, 32 n^3 bytes, whether or not they are asked for. Measured:
 # 37 MB at 100 links, 264 MB at 200, 858 MB at 300. Each process of a study holds one at a time.
@@ -45,13 +55,20 @@ def chain_model(scene: Scene) -> Any:
     """The chain in Pinocchio: x points down, and each rod lies along the x axis of its joint's frame."""
     model = pin.Model()
     model.gravity = pin.Motion(np.array([scene.effects.gravity or 0.0, 0.0, 0.0]), np.zeros(3))
-    joint, end = 0, np.zeros(3)
+    joint, end, rods = 0, np.zeros(3), acting.rods(scene)
     for i in range(scene.n):
         joint = model.addJoint(joint, pin.JointModelRZ(), pin.SE3(np.eye(3), end), f"joint {i}")
         end = np.array([scene.lengths[i], 0.0, 0.0])
         # appendBodyToJoint would add it to nothing; that sum takes masses below 2e-16 kg for 2e-16 kg, in the lever.
-        model.inertias[joint] = pin.Inertia(float(scene.masses[i]), end, np.zeros((3, 3)))
+        model.inertias[joint] = _inertia(float(scene.masses[i]), float(rods[i]), end)
     return model
+
+
+def _inertia(mass: float, rod: float, end: FloatArray) -> Any:
+    """A point at `end` (3,) m and a uniform rod from the joint to there, whose own inertia lies across it."""
+    both = mass + rod
+    middle = rod / 12.0 + mass * rod / (4.0 * both)
+    return pin.Inertia(both, end * ((mass + 0.5 * rod) / both), np.diag([0.0, 1.0, 1.0]) * middle * (end @ end))
 
 
 class _Run:
@@ -60,32 +77,44 @@ class _Run:
     def __init__(self, scene: Scene, method: str, dt: float) -> None:
         self._model = chain_model(scene)
         self._data = self._model.createData()
-        self._no_torques = np.zeros(scene.n)
+        self._scene, self._no_torques, self._taken = scene, np.zeros(scene.n), 0
+        self._shaken = "driven_pivot" in scene.terms
+        self._pushed = not scene.terms.keys() <= {"gravity", "rod_mass", "driven_pivot"}
         self._q, self._v, self._dt = joint_values(scene.angles), joint_values(scene.rates), dt
         self._step = {"rk4": self._rk4, "euler": self._euler}[method]
 
     def advance(self, steps: int) -> None:
         with np.errstate(all="ignore"):
             for _ in range(steps):
-                self._step()
+                self._step(self._taken * self._dt)
+                self._taken += 1
 
-    def _accelerations(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        found: FloatArray = pin.aba(self._model, self._data, q, v, self._no_torques)
+    def _accelerations(self, t: float, q: FloatArray, v: FloatArray) -> FloatArray:
+        if self._shaken:
+            x, y = acting.pivot_acceleration(self._scene, t)
+            self._model.gravity = pin.Motion(np.array([y, -x, 0.0]), np.zeros(3))
+        torques = self._torques(t, q, v) if self._pushed else self._no_torques
+        found: FloatArray = pin.aba(self._model, self._data, q, v, torques)
         return found
 
-    def _euler(self) -> None:
-        self._v = self._v + self._dt * self._accelerations(self._q, self._v)
+    def _torques(self, t: float, q: FloatArray, v: FloatArray) -> FloatArray:
+        """What pushes a rod pushes all joints before it."""
+        on_rods = acting.generalized_forces(self._scene, t, np.cumsum(q), np.cumsum(v))
+        return np.asarray(np.cumsum(on_rods[::-1])[::-1])
+
+    def _euler(self, t: float) -> None:
+        self._v = self._v + self._dt * self._accelerations(t, self._q, self._v)
         self._q = self._q + self._dt * self._v
 
-    def _rk4(self) -> None:
+    def _rk4(self, t: float) -> None:
         q, v, h = self._q, self._v, self._dt
-        first = self._accelerations(q, v)
+        first = self._accelerations(t, q, v)
         v2 = v + 0.5 * h * first
-        second = self._accelerations(q + 0.5 * h * v, v2)
+        second = self._accelerations(t + 0.5 * h, q + 0.5 * h * v, v2)
         v3 = v + 0.5 * h * second
-        third = self._accelerations(q + 0.5 * h * v2, v3)
+        third = self._accelerations(t + 0.5 * h, q + 0.5 * h * v2, v3)
         v4 = v + h * third
-        fourth = self._accelerations(q + h * v3, v4)
+        fourth = self._accelerations(t + h, q + h * v3, v4)
         self._q = q + h / 6.0 * (v + 2.0 * (v2 + v3) + v4)
         self._v = v + h / 6.0 * (first + 2.0 * (second + third) + fourth)
 

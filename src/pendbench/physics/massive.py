@@ -1,4 +1,4 @@
-"""The accelerations of a chain on rods with mass, in O(n) (docs/equations.md, (E44) to (E48)).
+"""The accelerations of a chain on rods with mass, in O(n) (docs/equations.md, (E45) to (E48)).
 
 What hangs on a joint is more than a tension here: a matrix (2, 2) of inertia, in the frame of the rod that ends there.
 """
@@ -35,12 +35,12 @@ def _inwards(system: RodSystem, forced: bool) -> None:
         third, twelfth = rods[i] / 3.0, rods[i] / 12.0
         cc, cs, ss = c * c, c * s, s * s
         loaded = m * factor
-        # (E45): the inertia of mass i and of all that hangs on it, and its determinant.
+        # The inertia of mass i and of all that hangs on it, and its determinant, (E46).
         outer_area = m * (loaded + (along + across)) + area
         outer_along = (loaded + cc * along) + (ss * across - 2.0 * (cs * both))
         outer_across = (loaded + ss * along) + (cc * across + 2.0 * (cs * both))
         outer_both = cs * (along - across) + (cc - ss) * both
-        # (E46): seen from the rod's inner end.
+        # The same seen from the rod's inner end, (E45), (E46).
         following = third * factor + outer_across
         area = third * (rods[i] * (0.75 * third * factor + outer_across + 0.25 * outer_along) + outer_area)
         along = rods[i] * following + third * outer_along + outer_area
@@ -49,7 +49,7 @@ def _inwards(system: RodSystem, forced: bool) -> None:
         inverse = 1.0 / following
         turned = outer_both * inverse
         passed = 2.0 * twelfth * factor * inverse
-        # (E47): the same for what pulls.
+        # And what pulls, (E45).
         whirl = scratch[_WHIRL, i]
         pulled = c * pull_along - s * pull_across
         pushed = s * pull_along + c * pull_across

@@ -17,10 +17,12 @@ from pendbench.solvers.tableaux import EmbeddedPair
 #: A first step to try, s. Error control shrinks it where it is too large.
 FIRST_STEP = 1e-3
 
+#: The next step: so much of what error control would allow, and so many times the last one at most and at least.
+SAFETY = 0.9
+GROW_AT_MOST = 5.0
+SHRINK_AT_MOST = 0.2
+
 _EPS = 2.0**-52
-_SAFETY = 0.9
-_GROW_AT_MOST = 5.0
-_SHRINK_AT_MOST = 0.2
 
 # A step is not to be better than so many times what the last digits of its start make of it. Where nothing else was
 # left (angles of a million turns), the errors of 1800 steps had 0.7 times that for their median and 5 for the worst.
@@ -68,11 +70,11 @@ def _rounding_error(
 def _step_factor(error: float, order: int) -> float:
     """By how much the step may change after one with this scaled error."""
     if error == 0.0:
-        return _GROW_AT_MOST
+        return GROW_AT_MOST
     if not np.isfinite(error):
-        return _SHRINK_AT_MOST
-    wanted: float = _SAFETY * error ** (-1.0 / order)
-    return min(_GROW_AT_MOST, max(_SHRINK_AT_MOST, wanted))
+        return SHRINK_AT_MOST
+    wanted: float = SAFETY * error ** (-1.0 / order)
+    return min(GROW_AT_MOST, max(SHRINK_AT_MOST, wanted))
 
 
 @compiled
@@ -113,7 +115,7 @@ def integrate(
     k = np.empty((stages, d))
     inner, scale, change = np.empty(d), np.empty(d), np.empty(d)
     accepted, rejected = 0, 0
-    grow = _GROW_AT_MOST
+    grow = GROW_AT_MOST
     h = max(h, smallest)
     while t < end:
         if accepted + rejected >= most_steps:
@@ -147,7 +149,7 @@ def integrate(
             accepted += 1
             # A step cut short to land on `end` says little about the next one.
             h = max(h, step * min(factor, grow)) if last else step * min(factor, grow)
-            grow = _GROW_AT_MOST
+            grow = GROW_AT_MOST
         else:
             rejected += 1
             grow = 1.0

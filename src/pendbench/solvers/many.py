@@ -13,14 +13,12 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled_for_threads, inlined
-from pendbench.solvers.adaptive import FIRST_STEP
+from pendbench.solvers.adaptive import FIRST_STEP, GROW_AT_MOST, SAFETY, SHRINK_AT_MOST
 from pendbench.solvers.copying import copy
 from pendbench.solvers.explicit import add_stages
 from pendbench.solvers.outcome import CROSSED, DONE, NOT_FINITE, TOO_MANY, TOO_SMALL
 from pendbench.solvers.problem import derivatives_of_many
 from pendbench.solvers.tableaux import EmbeddedPair, Tableau
-
-_SAFETY, _GROW_AT_MOST, _SHRINK_AT_MOST = 0.9, 5.0, 0.2
 
 # The rows of what each lane knows of its time.
 _T, _H, _STEP, _GROW = range(4)
@@ -66,9 +64,9 @@ def _combine(worst5: FloatArray, worst3: FloatArray) -> None:
 def _factors(errors: FloatArray, out: FloatArray) -> None:
     """By how much each step may change: the eighth root, which vectorises as three square roots."""
     for b in range(len(out)):
-        wanted = _SAFETY / np.sqrt(np.sqrt(np.sqrt(errors[b])))
-        wanted = wanted if wanted < _GROW_AT_MOST else _GROW_AT_MOST
-        out[b] = wanted if wanted > _SHRINK_AT_MOST else _SHRINK_AT_MOST  # nan shrinks
+        wanted = SAFETY / np.sqrt(np.sqrt(np.sqrt(errors[b])))
+        wanted = wanted if wanted < GROW_AT_MOST else GROW_AT_MOST
+        out[b] = wanted if wanted > SHRINK_AT_MOST else SHRINK_AT_MOST  # nan shrinks
 
 
 @inlined
@@ -185,7 +183,7 @@ def _judge(
         lane[_T, b] = end if last else t + step
         grown = step * min(factor, lane[_GROW, b])
         lane[_H, b] = max(h, grown) if last else grown
-        lane[_GROW, b] = _GROW_AT_MOST
+        lane[_GROW, b] = GROW_AT_MOST
     else:
         lane[_GROW, b] = 1.0
         lane[_H, b] = step * min(factor, 1.0)
@@ -287,7 +285,7 @@ def _take_up(
         waiting += 1
         for i in range(len(y)):
             y[i, b], carry[i, b] = starts[run, i], 0.0
-        lane[_T, b], lane[_H, b], lane[_GROW, b] = 0.0, FIRST_STEP, _GROW_AT_MOST
+        lane[_T, b], lane[_H, b], lane[_GROW, b] = 0.0, FIRST_STEP, GROW_AT_MOST
         first = 0
         if times[0] == 0.0:
             for i in range(len(y)):

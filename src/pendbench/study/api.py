@@ -13,6 +13,7 @@ import pandas as pd
 from pendbench.connect import LOCAL, check_cluster
 from pendbench.errors import InputError
 from pendbench.files import alone_in
+from pendbench.processes import processors
 from pendbench.report import write_report
 from pendbench.strict import show, shown_path
 from pendbench.study.baseline import baseline_path, read_baseline, regressions, write_baseline
@@ -53,14 +54,6 @@ class Finished:
     results: Results
     out: Path
     regressions: tuple[str, ...]
-
-
-def processors() -> int:
-    """How many processors this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        return os.cpu_count() or 1
 
 
 def _folder(request: Request, plan: Plan) -> Path:

@@ -26,6 +26,7 @@ _FLOORS: Final = {
     "energy_drift_half": 1e-12,
     "error_max": 1e-12,
     "energy_drift_max": 1e-12,
+    "balance_error": 1e-10,
     "gap_max": 1e-9,
     "model_error": 1e-8,
 }
