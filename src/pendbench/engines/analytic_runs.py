@@ -10,6 +10,7 @@ import numpy as np
 from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault, State
 from pendbench.physics import canonical
+from pendbench.physics.acting import check_plain
 from pendbench.physics.geometry import positions, velocities
 from pendbench.physics.recursion import system_of
 from pendbench.physics.series import series_system_of
@@ -195,6 +196,7 @@ class _Ends:
     """The rods' ends in the plane, as RATTLE moves them, and what they say of angles and rates."""
 
     def __init__(self, scene: Scene) -> None:
+        check_plain(scene, "RATTLE")
         gravity = scene.effects.gravity or 0.0
         self.rods = rattle.Rods(scene.masses.copy(), scene.lengths.copy(), gravity, np.empty((8, scene.n)))
         self.points = positions(scene.lengths, scene.angles)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
+from pendbench.errors import InputError
 from pendbench.physics.geometry import velocities
 from pendbench.scene import Scene
 
@@ -139,3 +140,10 @@ def mass_potential(scene: Scene, places: FloatArray) -> FloatArray:
 def is_plain(scene: Scene) -> bool:
     """Whether nothing acts but gravity."""
     return scene.terms.keys() <= {"gravity"}
+
+
+def check_plain(scene: Scene, what: str) -> None:
+    """Raise InputError where more than gravity acts, which `what` does not know of."""
+    if not is_plain(scene):
+        others = ", ".join(name for name in scene.terms if name != "gravity")
+        raise InputError(f"scene {scene.name!r} calls for {others}; allowed: gravity, which is all that {what} knows")

@@ -58,13 +58,15 @@ def energy_scale(scene: Scene) -> float:
 
 
 def angular_momentum(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    """Angular momentum about the pivot, (...,) kg m^2/s, counter-clockwise positive. equations.md (E5).
+    """Angular momentum about the pivot, (...,) kg m^2/s, counter-clockwise positive. equations.md (E5), (E36).
 
     theta: (..., n) rad; omega: (..., n) rad/s. Without gravity it is conserved.
     """
     place = positions(scene.lengths, theta)
     speed = velocities(scene.lengths, theta, omega)
-    return np.asarray(np.sum(scene.masses * (place[..., 0] * speed[..., 1] - place[..., 1] * speed[..., 0]), axis=-1))
+    turning = place[..., 0] * speed[..., 1] - place[..., 1] * speed[..., 0]
+    spinning = acting.rod_inertias(scene) * omega
+    return np.asarray(np.sum(acting.lumped_masses(scene) * turning + spinning, axis=-1))
 
 
 def tensions(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
@@ -82,6 +84,7 @@ def rod_forces(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray
     theta: (n,) rad; omega: (n,) rad/s. A massless rod can pass force only along itself, so the part of it across the
     rod is zero exactly when the accelerations are right. equations.md (E20).
     """
+    acting.check_plain(scene, "the rods' force by (E20)")
     below_free_fall = -_accelerations_against_free_fall(scene, theta, omega)
     weighed = scene.masses[:, np.newaxis] * below_free_fall
     return np.cumsum(weighed[::-1], axis=0)[::-1]

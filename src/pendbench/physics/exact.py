@@ -9,6 +9,7 @@ from scipy.special import ellipj, ellipkm1, elliprf
 
 from pendbench.arrays import FloatArray
 from pendbench.errors import InputError
+from pendbench.physics.acting import check_plain
 from pendbench.physics.dense import hanging_masses
 from pendbench.physics.geometry import TURN
 from pendbench.scene import Scene
@@ -43,7 +44,7 @@ def normal_modes(scene: Scene) -> tuple[FloatArray, FloatArray]:
     values, which keeps them accurate to n rounding errors where an eigenvalue solver would keep n^2.
     Raises InputError where the scene has an effect other than gravity, or not that. equations.md (E28) to (E30).
     """
-    _check_only_gravity(scene)
+    check_plain(scene, "the closed form")
     if not scene.effects.gravity:
         raise InputError(f"scene {scene.name!r}: no gravity, so the chain has no small oscillations")
     stiffness = np.sqrt(scene.effects.gravity * hanging_masses(scene.masses) * scene.lengths)
@@ -57,17 +58,7 @@ def normal_modes(scene: Scene) -> tuple[FloatArray, FloatArray]:
 def _check_single(scene: Scene) -> None:
     if scene.n != 1:
         raise InputError(f"scene {scene.name!r}: {scene.n} links; a closed form is known for 1")
-    _check_only_gravity(scene)
-
-
-def _check_only_gravity(scene: Scene) -> None:
-    others = sorted(set(scene.effects.named()) - {"gravity"})
-    if others:
-        raise InputError(f"scene {scene.name!r}: no closed form with {', '.join(others)}; allowed: gravity")
-
-
-# From here on `complement` is 1 - m, m = k^2 the parameter of an elliptic function: close to the border between
-# swinging and turning over the top, m itself has no digits of it left.
+    check_plain(scene, "the closed form")
 
 
 def _under_gravity(start: float, rate: float, frequency: float, times: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled, specialise
+from pendbench.physics.acting import check_plain
 from pendbench.scene import Scene
 from pendbench.solvers.double_double import PI, add, divide, multiply, scale, sine_cosine, split, subtract, two_product
 from pendbench.solvers.extrapolation import extended_derivative
@@ -40,6 +41,7 @@ class VectorForm(NamedTuple):
 
 
 def _arguments(scene: Scene) -> tuple[FloatArray, FloatArray, float, FloatArray]:
+    check_plain(scene, "this form of the reference")
     gravity = scene.effects.gravity
     scratch = np.empty((4, scene.n, 2))
     return np.array(scene.masses), np.array(scene.lengths), 0.0 if gravity is None else float(gravity), scratch

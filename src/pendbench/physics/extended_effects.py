@@ -1,8 +1,9 @@
 """The chain with effects in double-double arithmetic, in two formulations: the two sides of its reference.
 
 The recursive form eliminates link after link, each with an inertia (2, 2). The dense form solves the matrices of the
-equations of motion, in the frame of the ground. They share the effects' laws and nothing else (docs/equations.md, (E36) to (E46)).
-State (2 n + 1, 2): theta, omega, t; the time is one of the variables, since the method of the reference knows none.
+equations of motion, in the frame of the ground. They share the effects' laws and nothing else (docs/equations.md,
+(E36) to (E46)). State (2 n + 1, 2): theta, omega, t; the time is one of the variables, since the method of the
+reference knows none.
 """
 
 from __future__ import annotations

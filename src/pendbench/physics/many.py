@@ -12,6 +12,7 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import inlined, specialise
+from pendbench.physics.acting import check_plain
 from pendbench.physics.trigonometry import FAR, cosine_sine, direction, rounded_bend
 from pendbench.scene import Scene
 from pendbench.solvers import problem
@@ -38,7 +39,11 @@ class ManySystem(NamedTuple):
 
 
 def many_system_of(scene: Scene, lanes: int) -> ManySystem:
-    """The scene's chain and effects, ready for the kernels, `lanes` states at a time."""
+    """The scene's chain and effects, ready for the kernels, `lanes` states at a time.
+
+    Raises InputError where more than gravity acts.
+    """
+    check_plain(scene, "an ensemble")
     gravity = scene.effects.gravity
     return ManySystem(
         masses=np.array(scene.masses),

@@ -12,6 +12,7 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.compiled import inlined, specialise
+from pendbench.physics.acting import check_plain
 from pendbench.physics.trigonometry import direction, rounded_bend
 from pendbench.scene import Scene
 from pendbench.solvers import problem
@@ -50,7 +51,11 @@ class SeriesSystem(NamedTuple):
 
 
 def series_system_of(scene: Scene, order: int) -> SeriesSystem:
-    """The scene's chain and effects, with room for series of that order."""
+    """The scene's chain and effects, with room for series of that order.
+
+    Raises InputError where more than gravity acts.
+    """
+    check_plain(scene, "the Taylor series")
     masses, gravity = np.array(scene.masses), scene.effects.gravity
     joints = scene.n - 1
     return SeriesSystem(

@@ -70,8 +70,8 @@ def answer(results: Results) -> str:
             )
     refused = [row for row in cases if word(row, "status") == "refused"]
     if refused:
-        told = [f"{name} ({_scenes_of(refused, cases, name)})" for name in pairs(refused)]
-        text.append(f"Refused by {listed(told)}.")
+        refusals = [f"{name} ({_scenes_of(refused, cases, name)})" for name in pairs(refused)]
+        text.append(f"Refused by {listed(refusals)}.")
     return " ".join(text) or "No case of this study ended well."
 
 

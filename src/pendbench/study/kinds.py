@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from pendbench.study.results import Results
     from pendbench.study.runner import Runner
 
+#: The kinds whose measures hold with effects beside gravity; the others count on energy being conserved.
+WITH_EFFECTS: Final = frozenset({"effects"})
+
 #: Names of kinds, each with its module.
 KINDS: Final = {
     "chaos": "pendbench.study.chaos",

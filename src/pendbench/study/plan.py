@@ -22,7 +22,7 @@ from pendbench.scene import Scene, load_scene
 from pendbench.scene_file import Table, one_line_title
 from pendbench.strict import input_error, read_toml, show, shown_path, validate
 from pendbench.study.case import Case
-from pendbench.study.kinds import KINDS, kind
+from pendbench.study.kinds import KINDS, WITH_EFFECTS, kind
 
 _STEP: Final = Range(1e-6, 1e3, "s")  # times are told apart to 1e-12 s
 _MOST_STEPS: Final = 1e12
@@ -118,6 +118,8 @@ def load_plan(path_or_name: str | os.PathLike[str], *, quick: bool = False, engi
     if quick:
         where, options = f"{where} [quick]" if overlay else where, changed
     scenes = tuple(_scenes(where, options.scenes, path.parent))
+    if name not in WITH_EFFECTS:
+        _check_plain(where, name, scenes)
     tables = _selected(where, options.engines, engines)
     absent = sorted({table.name for _, table in tables if table.optional and not _installed(table.name)})
     if absent and all(table.name in absent for _, table in tables):
@@ -129,6 +131,13 @@ def load_plan(path_or_name: str | os.PathLike[str], *, quick: bool = False, engi
     plan = Plan(printable(path.stem), where, options, scenes, cases, quick, tuple(absent))
     its.check(plan)
     return plan
+
+
+def _check_plain(where: str, kind_name: str, scenes: Sequence[Scene]) -> None:
+    for scene in scenes:
+        if others := sorted(scene.terms.keys() - {"gravity"}):
+            allowed = f"scenes with gravity alone, in a study of kind {kind_name!r}"
+            raise input_error(where, f"scenes has {scene.name!r}, which calls for {others[0]}; allowed: {allowed}")
 
 
 def _scenes(where: str, names: Sequence[str], folder: Path) -> Iterator[Scene]:
