@@ -50,13 +50,15 @@ ONLY = {
     "engines.pymunk": {
         "arrays",
         "engines.protocol",
+        "engines.pymunk_bodies",
         "engines.pymunk_forces",
         "physics.acting",
         "scene",
         "trajectory",
     },
+    "engines.pymunk_bodies": {"arrays", "engines.protocol", "physics.acting", "physics.geometry", "scene"},
     "engines.pymunk_forces": {"arrays", "physics.acting", "physics.geometry", "scene"},
-    "engines.pinocchio": {"arrays", "engines.protocol", "scene", "trajectory"},
+    "engines.pinocchio": {"arrays", "engines.protocol", "physics.acting", "scene", "trajectory"},
     "engines.analytic": {
         "arrays",
         "engines.analytic_runs",
@@ -77,7 +79,7 @@ ONLY = {
 #: Libraries that only these may import.
 RESERVED = {
     "mujoco": {"engines.mujoco", "engines.mujoco_forces", "engines.mjcf"},
-    "pymunk": {"engines.pymunk", "engines.pymunk_forces"},
+    "pymunk": {"engines.pymunk", "engines.pymunk_bodies", "engines.pymunk_forces"},
     "heyoka": {"engines.heyoka"},
     "pinocchio": {"engines.pinocchio"},
     "matplotlib": {"report"},

@@ -17,6 +17,7 @@ from pymunk import batch
 
 from pendbench.arrays import FloatArray
 from pendbench.engines.protocol import Fault, Mapped, Method, Setting, Simulation, State
+from pendbench.engines.pymunk_bodies import TORN, BodiesRun
 from pendbench.engines.pymunk_forces import Forces
 from pendbench.physics import acting
 from pendbench.scene import Scene
@@ -42,11 +43,10 @@ _EFFECTS: Final = {
     "joint_damping": Mapped(f"{_APPLIED}: its masses do not turn, so its rotary springs have nothing to hold"),
     "joint_stiffness": Mapped(f"{_APPLIED}, for the same reason"),
     "air_drag": Mapped(f"{_APPLIED}; its own damping of the space is another law"),
-    "rod_mass": Mapped("its masses are points on pins; a rod with inertia is a body that turns", refused=True),
+    "rod_mass": Mapped("bodies that turn, on pivot joints instead of pins"),
     "driven_pivot": Mapped("gravity of the pivot's frame, set before each step"),
     "drive_torque": Mapped(_APPLIED),
 }
-_TORN: Final = 0.5
 _FIELDS: Final = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
 
 
@@ -129,7 +129,7 @@ class _Run:
         rods = self._measure()
         if not (np.all(np.isfinite(rods.angles)) and np.all(np.isfinite(rods.rates))):
             return Fault("not finite", "a position or a velocity is not finite")
-        if rods.gap > _TORN:
+        if rods.gap > TORN:
             return Fault("torn", f"a rod is off its length by {rods.gap:.3g} of it")
         return None
 
@@ -159,9 +159,10 @@ class PymunkEngine:
         """The version of pymunk itself."""
         return str(pymunk.version)
 
-    def refuses(self, scene: Scene) -> str | None:  # noqa: ARG002
-        """Nothing but what `effects` says."""
-        return None
+    def refuses(self, scene: Scene) -> str | None:
+        """Massless rods among heavy ones: a body that turns needs an inertia."""
+        rods = acting.rods(scene)
+        return "rods of which some have no mass" if rods.any() and not rods.all() else None
 
     def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:
         """A run at time 0, with as many `iterations` as are given, or as the method chooses."""
@@ -169,4 +170,5 @@ class PymunkEngine:
             raise ValueError(f"method {method!r} needs a step")
         chosen = self.methods[method].with_defaults(settings)
         iterations = int(chosen.get("iterations", enough_iterations(scene.n)))
-        return _Run(scene, dt, iterations, tuned=method == "tuned")
+        run = BodiesRun if "rod_mass" in scene.terms else _Run
+        return run(scene, dt, iterations, tuned=method == "tuned")
