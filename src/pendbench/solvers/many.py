@@ -2,12 +2,13 @@
 
 Runs share nothing but the instructions: a lane takes a step of its own length, keeps or rejects it by itself, and when
 its run is done it takes up the next one, so all lanes stay at work until none is left. The steps are those that
-`adaptive.integrate` takes for one run, but for rounding.
+`adaptive.integrate` takes for one run, but for rounding, and but for runs whose angles are so many turns that their
+last digits decide the error: `integrate` knows that, and here such a run ends where its steps become too small.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,25 @@ _T, _H, _STEP, _GROW = range(4)
 # And of its work: which run it is at, which time comes next, how many steps it has taken.
 _RUN, _NEXT, _TAKEN = range(3)
 _IDLE = -1
+
+
+class _Lanes(NamedTuple):
+    """y and carry (d, lanes): the states, and what rounding left out of them. clock (4, lanes), work (3, lanes)."""
+
+    y: FloatArray
+    carry: FloatArray
+    clock: FloatArray
+    work: Any
+
+
+class _Runs(NamedTuple):
+    """What is to be run, and where it is written down: as in `integrate_many`."""
+
+    starts: FloatArray
+    times: FloatArray
+    out: FloatArray
+    outcomes: Any
+    stopped: FloatArray
 
 
 @inlined
@@ -70,27 +90,27 @@ def _factors(errors: FloatArray, out: FloatArray) -> None:
 
 
 @inlined
-def _propose_all(lane: FloatArray, work: Any, times: FloatArray) -> bool:
+def _propose_all(lanes: _Lanes, times: FloatArray) -> bool:
     """The next step of every lane, none for an idle one; whether any is at work."""
     busy = False
-    for b in range(lane.shape[1]):
-        lane[_STEP, b] = 0.0
-        if work[_RUN, b] != _IDLE:
+    for b in range(lanes.clock.shape[1]):
+        lanes.clock[_STEP, b] = 0.0
+        if lanes.work[_RUN, b] != _IDLE:
             busy = True
-            _propose(lane, b, times[work[_NEXT, b]])
+            _propose(lanes.clock, b, times[lanes.work[_NEXT, b]])
     return busy
 
 
 @inlined
-def _propose(lane: FloatArray, b: int, end: float) -> None:
+def _propose(clock: FloatArray, b: int, end: float) -> None:
     """The next step of a lane, whose length is such that time does not slip: as in `adaptive.integrate`."""
-    t, h = lane[_T, b], lane[_H, b]
+    t, h = clock[_T, b], clock[_H, b]
     left = end - t
     if h < left:
         target = t + (0.5 * left if h > 0.5 * left else h)
-        lane[_STEP, b] = target - t
+        clock[_STEP, b] = target - t
     else:
-        lane[_STEP, b] = left
+        clock[_STEP, b] = left
 
 
 @compiled_for_threads
@@ -117,22 +137,17 @@ def integrate_many(
     other arguments are those of `adaptive.integrate`; method must be of order 8. The system has room for `lanes`.
     """
     d, stages = starts.shape[1], len(method.b)
-    # The same memory twice: rows by lanes, and flat for what does not care.
-    before = np.zeros((d, lanes))
-    y, carry, inner, slopes = (
-        np.zeros((d, lanes)),
-        np.zeros((d, lanes)),
-        np.zeros((d, lanes)),
-        np.zeros((stages, d, lanes)),
-    )
+    y, inner, slopes = np.zeros((d, lanes)), np.zeros((d, lanes)), np.zeros((stages, d, lanes))
+    before, factor, room = np.zeros((d, lanes)), np.zeros(lanes), np.zeros((2, lanes))
+    # The same memory flat, for what does not care which number is whose.
     flat_y, flat_inner, flat_slopes = y.reshape(-1), inner.reshape(-1), slopes.reshape(stages, -1)
-    lane, room, factor = np.zeros((4, lanes)), np.zeros((2, lanes)), np.zeros(lanes)
-    step, error = lane[_STEP], room[0]
-    work = np.full((3, lanes), _IDLE)
+    all_lanes = _Lanes(y, np.zeros((d, lanes)), np.zeros((4, lanes)), np.full((3, lanes), _IDLE))
+    runs = _Runs(starts, times, out, outcomes, stopped)
+    step, error = all_lanes.clock[_STEP], room[0]
     waiting = 0
     for b in range(lanes):
-        waiting = _take_up(b, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
-    while _propose_all(lane, work, times):
+        waiting = _take_up(b, waiting, all_lanes, runs)
+    while _propose_all(all_lanes, times):
         for s in range(stages):
             copy(flat_y, flat_inner)
             add_stages(method.a[s], s, 1.0, flat_slopes, flat_inner)
@@ -146,76 +161,69 @@ def integrate_many(
         _factors(error, factor)
         _clear(flat_inner)
         add_stages(method.b, stages, 1.0, flat_slopes, flat_inner)
-        for i in range(d):
-            for b in range(lanes):
-                small = inner[i, b] + carry[i, b] if error[b] <= 1.0 else 0.0
-                before[i, b] = y[i, b]
-                total = y[i, b] + small
-                carry[i, b] = small - (total - y[i, b]) if error[b] <= 1.0 else carry[i, b]
-                y[i, b] = total
+        _advance_all(all_lanes, inner, error, before)
         for b in range(lanes):
-            if work[_RUN, b] != _IDLE:
-                how = _judge(b, error[b], factor[b], times, smallest, most_steps, lane, work)
+            if all_lanes.work[_RUN, b] != _IDLE:
+                how = _judge(b, error[b], factor[b], times, smallest, most_steps, all_lanes)
                 if limit < np.inf and error[b] <= 1.0:
-                    _look_for_crossing(b, before, y, lane, work, limit, outcomes, stopped)
-                    if outcomes[work[_RUN, b]] == CROSSED:
-                        waiting = _take_up(b, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+                    _look_for_crossing(b, before, all_lanes, limit, runs)
+                    if outcomes[all_lanes.work[_RUN, b]] == CROSSED:
+                        waiting = _take_up(b, waiting, all_lanes, runs)
                         continue
-                waiting = _settle(b, how, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+                waiting = _settle(b, how, waiting, all_lanes, runs)
 
 
-@compiled_for_threads
+@inlined
+def _advance_all(lanes: _Lanes, change: FloatArray, error: FloatArray, before: FloatArray) -> None:
+    """Add the change (d, lanes) to the state of each lane whose error allows it; keep what it was in `before`."""
+    y, carry = lanes.y, lanes.carry
+    for i in range(y.shape[0]):
+        for b in range(y.shape[1]):
+            small = change[i, b] + carry[i, b] if error[b] <= 1.0 else 0.0
+            before[i, b] = y[i, b]
+            total = y[i, b] + small
+            carry[i, b] = small - (total - y[i, b]) if error[b] <= 1.0 else carry[i, b]
+            y[i, b] = total
+
+
+@inlined
 def _judge(
-    b: int,
-    error: float,
-    factor: float,
-    times: FloatArray,
-    smallest: float,
-    most_steps: int,
-    lane: FloatArray,
-    work: Any,
+    b: int, error: float, factor: float, times: FloatArray, smallest: float, most_steps: int, lanes: _Lanes
 ) -> int:
     """Move a lane's clock on, or shrink its step; and whether it has to give up: DONE where not."""
-    end, t, h, step = times[work[_NEXT, b]], lane[_T, b], lane[_H, b], lane[_STEP, b]
+    clock, work = lanes.clock, lanes.work
+    end, t, h, step = times[work[_NEXT, b]], clock[_T, b], clock[_H, b], clock[_STEP, b]
     last = h >= end - t
     work[_TAKEN, b] += 1
     if error <= 1.0:
-        lane[_T, b] = end if last else t + step
-        grown = step * min(factor, lane[_GROW, b])
-        lane[_H, b] = max(h, grown) if last else grown
-        lane[_GROW, b] = GROW_AT_MOST
+        clock[_T, b] = end if last else t + step
+        grown = step * min(factor, clock[_GROW, b])
+        clock[_H, b] = max(h, grown) if last else grown
+        clock[_GROW, b] = GROW_AT_MOST
     else:
-        lane[_GROW, b] = 1.0
-        lane[_H, b] = step * min(factor, 1.0)
-        if not np.isfinite(error) and work[_TAKEN, b] > 1 and lane[_H, b] < smallest:
+        clock[_GROW, b] = 1.0
+        clock[_H, b] = step * min(factor, 1.0)
+        if not np.isfinite(error) and work[_TAKEN, b] > 1 and clock[_H, b] < smallest:
             return NOT_FINITE
-        if lane[_H, b] < smallest or t + 0.1 * lane[_H, b] == t:
+        if clock[_H, b] < smallest or t + 0.1 * clock[_H, b] == t:
             return TOO_SMALL
     return DONE if work[_TAKEN, b] < most_steps else TOO_MANY
 
 
-@compiled_for_threads
-def _look_for_crossing(
-    b: int,
-    before: FloatArray,
-    y: FloatArray,
-    lane: FloatArray,
-    work: Any,
-    limit: float,
-    outcomes: Any,
-    stopped: FloatArray,
-) -> None:
+@inlined
+def _look_for_crossing(b: int, before: FloatArray, lanes: _Lanes, limit: float, runs: _Runs) -> None:
     """Where the step of a lane took it past the limit, write down when."""
-    angles, step, earliest = y.shape[0] // 2, lane[_STEP, b], np.inf
+    y = lanes.y
+    angles, step, earliest = y.shape[0] // 2, lanes.clock[_STEP, b], np.inf
     for i in range(angles):
         if abs(y[i, b]) > limit:
             end = limit if y[i, b] > 0.0 else -limit
             share = _share_of_step(before[i, b], before[angles + i, b], y[i, b], y[angles + i, b], step, end)
             earliest = min(earliest, share)
     if earliest < np.inf:
-        run = work[_RUN, b]
-        outcomes[run] = CROSSED
-        stopped[run] = lane[_T, b] - (1.0 - earliest) * step
+        run = lanes.work[_RUN, b]
+        runs.outcomes[run] = CROSSED
+        runs.stopped[run] = lanes.clock[_T, b] - (1.0 - earliest) * step
 
 
 @compiled_for_threads
@@ -233,66 +241,43 @@ def _share_of_step(q0: float, v0: float, q1: float, v1: float, h: float, end: fl
     return high
 
 
-@compiled_for_threads
-def _settle(
-    b: int,
-    how: int,
-    waiting: int,
-    starts: FloatArray,
-    times: FloatArray,
-    y: FloatArray,
-    carry: FloatArray,
-    lane: FloatArray,
-    work: Any,
-    out: FloatArray,
-    outcomes: Any,
-    stopped: FloatArray,
-) -> int:
+@inlined
+def _settle(b: int, how: int, waiting: int, lanes: _Lanes, runs: _Runs) -> int:
     """Write down the states that a lane has reached; where its run is over, give it the next one."""
+    work, times = lanes.work, runs.times
     run = work[_RUN, b]
-    stopped[run] = lane[_T, b]
-    if lane[_T, b] == times[work[_NEXT, b]]:
-        for i in range(len(y)):
-            out[work[_NEXT, b], run, i] = y[i, b]
+    runs.stopped[run] = lanes.clock[_T, b]
+    if lanes.clock[_T, b] == times[work[_NEXT, b]]:
+        for i in range(len(lanes.y)):
+            runs.out[work[_NEXT, b], run, i] = lanes.y[i, b]
         work[_NEXT, b] += 1
         if work[_NEXT, b] == len(times):
-            outcomes[run] = DONE
-            return _take_up(b, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+            runs.outcomes[run] = DONE
+            return _take_up(b, waiting, lanes, runs)
     if how != DONE:
-        outcomes[run] = how
-        return _take_up(b, waiting, starts, times, y, carry, lane, work, out, outcomes, stopped)
+        runs.outcomes[run] = how
+        return _take_up(b, waiting, lanes, runs)
     return waiting
 
 
 @compiled_for_threads
-def _take_up(
-    b: int,
-    waiting: int,
-    starts: FloatArray,
-    times: FloatArray,
-    y: FloatArray,
-    carry: FloatArray,
-    lane: FloatArray,
-    work: Any,
-    out: FloatArray,
-    outcomes: Any,
-    stopped: FloatArray,
-) -> int:
+def _take_up(b: int, waiting: int, lanes: _Lanes, runs: _Runs) -> int:
     """Give a lane the next run that waits, and return which one waits then; without one the lane is idle."""
+    clock, work, times = lanes.clock, lanes.work, runs.times
     work[_RUN, b] = _IDLE
-    while waiting < len(starts):
+    while waiting < len(runs.starts):
         run = waiting
         waiting += 1
-        for i in range(len(y)):
-            y[i, b], carry[i, b] = starts[run, i], 0.0
-        lane[_T, b], lane[_H, b], lane[_GROW, b] = 0.0, FIRST_STEP, GROW_AT_MOST
+        for i in range(len(lanes.y)):
+            lanes.y[i, b], lanes.carry[i, b] = runs.starts[run, i], 0.0
+        clock[_T, b], clock[_H, b], clock[_GROW, b] = 0.0, FIRST_STEP, GROW_AT_MOST
         first = 0
         if times[0] == 0.0:
-            for i in range(len(y)):
-                out[0, run, i] = starts[run, i]
+            for i in range(len(lanes.y)):
+                runs.out[0, run, i] = runs.starts[run, i]
             first = 1
         work[_NEXT, b], work[_TAKEN, b] = first, 0
-        outcomes[run], stopped[run] = DONE, 0.0
+        runs.outcomes[run], runs.stopped[run] = DONE, 0.0
         if first < len(times):
             work[_RUN, b] = run
             return waiting
