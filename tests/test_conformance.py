@@ -7,8 +7,9 @@ import pytest
 
 from installed import installed_engines
 from pendbench.engines import conformance
+from pendbench.engines.analytic import AnalyticEngine
 from pendbench.engines.conformance import check_engine
-from pendbench.engines.protocol import Fault, Method, Setting, State
+from pendbench.engines.protocol import Fault, Mapped, Method, Setting, State
 from pendbench.engines.registry import engine
 from pendbench.scene import Effects, Scene
 from tampered import Passing, Tampered, honest_build, wrapping
@@ -198,12 +199,32 @@ def ignores_its_tolerance() -> Tampered:
     )
 
 
+class Forgetful(AnalyticEngine):
+    """Leaves out an effect, and says that it simulates it."""
+
+    methods = {"rk4": AnalyticEngine.methods["rk4"]}
+
+    def build(self, scene, method, dt, **settings):
+        return super().build(scene.without("drive_torque"), method, dt, **settings)
+
+
+class Windy(Forgetful):
+    """Names an effect that there is not."""
+
+    effects = {**AnalyticEngine.effects, "wind": Mapped("blows")}
+
+
 BROKEN = {
     "claims a lower order": (lambda: wrapping(Passing, order=2), "converges: its order is 3.99, and it claims 2"),
     "claims a higher order": (lambda: wrapping(Passing, order=5), "converges: its order is 3.99, and it claims 5"),
     "drops half a step": (half_a_step_behind, "converges: its order is 1.0"),
     "has other gravity": (has_other_gravity, "converges: its order is"),
     "ignores its tolerance": (ignores_its_tolerance, "converges: its error falls from"),
+    "leaves out an effect": (
+        Forgetful,
+        "simulates the effects it maps: drive_torque: what it changes in half a second",
+    ),
+    "names an unknown effect": (Windy, "simulates the effects it maps: effects has 'wind'; allowed: gravity, "),
     "changes the scene": (changes_the_scene, "leaves the scene alone: the scene was changed"),
     "gives one array": (lambda: wrapping(OneArray), "gives arrays of its own: a state that was read changes"),
     "obeys its reader": (lambda: wrapping(Obeying), "gives arrays of its own: "),

@@ -9,14 +9,16 @@ with is the dense form of the equations, integrated by scipy: it shares no code 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Simulation, State, refusal
+from pendbench.effects import names as effect_names
+from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Mapped, Simulation, State, refusal
 from pendbench.engines.registry import flaw_of
 from pendbench.errors import describe
 from pendbench.physics.geometry import wrapped
@@ -37,6 +39,17 @@ _LADDER: Final = (16, 32, 64, 128, 256, 512, 1024)
 _WINDOW: Final = (1e-11, 2e-2)
 _RUNGS: Final = 3
 _SAMPLES: Final = 4
+# Effects that each change the calm chain by a tenth of a radian or a radian a second, and how much of the change an
+# engine may miss: methods of order 1 miss up to 3 % of it at this step.
+_STRENGTHS: Final[Mapping[str, Any]] = {
+    "joint_damping": 0.2,
+    "joint_stiffness": 2.0,
+    "air_drag": {"linear": 0.3, "quadratic": 0.3},
+    "rod_mass": 0.5,
+    "driven_pivot": {"axis": "y", "amplitude": 0.05, "angular_frequency": 10.0},
+    "drive_torque": {"joint": 2, "amplitude": 0.5, "angular_frequency": 3.0},
+}
+_MISSED: Final = 0.1
 
 Run = Simulation | AdaptiveSimulation
 Check = Callable[[Engine, str], Iterator[str]]
@@ -283,18 +296,50 @@ def _obeys_its_tolerance(engine: Engine, method: str) -> Iterator[str]:
             yield f"its error falls from {loose:.2g} only to {tight:.2g} with a tolerance 1e5 times as tight"
 
 
+def _simulates_the_effects_it_maps(engine: Engine, method: str) -> Iterator[str]:
+    """What all its effects change in a calm chain; only where that is wrong, each by itself, to say which it is."""
+    mapped: Mapping[str, Mapped] = getattr(engine, "effects", {})
+    if unknown := sorted(set(mapped) - set(effect_names())):
+        yield f"effects has {show(unknown[0])}; allowed: {', '.join(effect_names())}"
+        return
+    known = [name for name, means in mapped.items() if name in _STRENGTHS and not means.refused]
+    own = engine.methods[method].effects
+    names = [name for name in known if own is None or name in own]
+    if not names or _misses(engine, method, names) < _MISSED:
+        return
+    off = {name: _misses(engine, method, [name]) for name in names}
+    wrong = [name for name in names if not off[name] < _MISSED]
+    if not wrong:
+        yield f"{', '.join(names)}: each alone is right, together they are not"
+    for name in wrong:
+        yield f"{name}: what it changes in half a second is off by {off[name]:.2g} of it"
+
+
+def _misses(engine: Engine, method: str, names: list[str]) -> float:
+    """How far what effects change in the engine is from what they change in truth, as a share of it."""
+    scene = dataclasses.replace(_calm(), effects=Effects(gravity=9.81, **{name: _STRENGTHS[name] for name in names}))
+    before, after = (_after(engine, each, method) for each in (_calm(), scene))
+    bare, changed = _truth()[1], _solved(scene)[1]
+    change = np.concatenate([after.theta - before.theta, after.omega - before.omega])
+    right = np.concatenate([changed.theta - bare.theta, changed.omega - bare.omega])
+    return float(np.abs(change - right).max() / np.abs(right).max())
+
+
 @cache
 def _truth() -> tuple[State, ...]:
-    """The calm chain at each quarter of a second. Equations.md (E6), by Dormand and Prince's method of order 8."""
+    """The calm chain at each quarter of a second."""
+    return _solved(_calm())
+
+
+def _solved(scene: Scene) -> tuple[State, ...]:
+    """The chain at each quarter of a second. equations.md (E6), by Dormand and Prince's method of order 8."""
     from scipy.integrate import solve_ivp
 
     from pendbench.physics.dense import accelerations
 
-    scene = _calm()
-
-    def slope(t: float, y: FloatArray) -> FloatArray:  # noqa: ARG001
+    def slope(t: float, y: FloatArray) -> FloatArray:
         theta, omega = np.split(y, 2)
-        return np.concatenate([omega, accelerations(scene, theta, omega)])
+        return np.concatenate([omega, accelerations(scene, theta, omega, t)])
 
     times, y = np.arange(1, _SAMPLES + 1) / _SAMPLES, np.concatenate([scene.angles, scene.rates])
     found = solve_ivp(slope, (0.0, 1.0), y, method="DOP853", t_eval=times, rtol=1e-13, atol=1e-14).y.T
@@ -348,6 +393,7 @@ _CHECKS: Final[tuple[Check, ...]] = (
     _ignores_the_unit_of_mass,
     _has_no_gravity_unasked,
     _converges,
+    _simulates_the_effects_it_maps,
     _is_well_when_calm,
     _owns_up,
 )
