@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import subprocess
 import sys
 
@@ -10,11 +9,11 @@ import numpy as np
 import pytest
 
 from pendbench.engines import registry
-from pendbench.engines.protocol import Fault, refusal
+from pendbench.engines.protocol import Fault
 from pendbench.errors import MissingEngineError
 from pendbench.physics.recursion import accelerations
 from pendbench.recording import simulate
-from pendbench.scene import Effects, Scene
+from pendbench.scene import Scene
 from scenes import chain, random_chain
 
 pin = pytest.importorskip("pinocchio")

@@ -50,24 +50,28 @@ _MEMORY: Final = (16_000_000, 256)
 _COMMENT: Final = """
   Written by `python -m pendbench.engines.mjcf`; do not edit.
   Masses are in a unit that makes the smallest inertia m l^2 at least 1 (the motion does not depend on it). MuJoCo wants
-  an inertia of every body: for point masses, set model.body_inertia[1:] = 0 after loading.
+  an inertia of every body: {advice}.
   The start is the keyframe "start". The rods are drawn, and neither weigh nor touch anything.
 """
+_LIGHT: Final = "for point masses, set model.body_inertia[1:] = 0 after loading"
+_HEAVY: Final = f"that of the rods has {INERTIA:g} too much, which rounding hides"
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
-    """Keep MuJoCo from printing a warning and from writing MUJOCO_LOG.TXT into the working folder.
+def alone() -> Iterator[None]:
+    """Keep MuJoCo from printing warnings, from writing MUJOCO_LOG.TXT, and from calling the user for passive forces.
 
-    MuJoCo has one warning callback for the whole process. The user's own is put back afterwards, and misses what
-    happens meanwhile: the warnings are counted in the data of the run, where the adapter reads them.
+    MuJoCo has one of each callback for the whole process. The user's own are put back afterwards, and miss what happens
+    meanwhile: the warnings are counted in the data of the run, where the adapter reads them.
     """
-    before = mujoco.get_mju_user_warning()
+    warned, pushed = mujoco.get_mju_user_warning(), mujoco.get_mjcb_passive()
     mujoco.set_mju_user_warning(_ignore)
+    mujoco.set_mjcb_passive(None)
     try:
         yield
     finally:
-        mujoco.set_mju_user_warning(before)
+        mujoco.set_mju_user_warning(warned)
+        mujoco.set_mjcb_passive(pushed)
 
 
 def _ignore(text: str) -> None:
@@ -106,7 +110,7 @@ def compile_chain(scene: Scene) -> mujoco.MjModel:
 
     What MuJoCo warns about here it counts again at the first step.
     """
-    with quiet(), warnings.catch_warnings():
+    with alone(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         model = chain_spec(scene).compile()
     model.body_inertia[1:] = [[link.inertia] * 3 for link in _links(scene)]
@@ -130,7 +134,7 @@ def write_mjcf(scene: Scene) -> str:
     if forced := [name for name in FORCED if name in scene.terms]:
         raise InputError(f"scene {scene.name!r} calls for {forced[0]}, which an MJCF file cannot hold")
     root = ET.Element("mujoco", model=printable(scene.name))
-    root.append(ET.Comment(_COMMENT))
+    root.append(ET.Comment(_COMMENT.format(advice=_HEAVY if acting.rods(scene).any() else _LIGHT)))
     _add_options(root, scene)
     ET.SubElement(ET.SubElement(root, "custom"), "text", name="title", data=printable(scene.title))
     _add_links(ET.SubElement(root, "worldbody"), scene)

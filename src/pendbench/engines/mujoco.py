@@ -8,7 +8,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from pendbench.engines.mjcf import compile_chain, joint_values, quiet
+from pendbench.engines.mjcf import alone, compile_chain, joint_values
 from pendbench.engines.mujoco_forces import applied_forces
 from pendbench.engines.protocol import Fault, Mapped, Method, Setting, Simulation, State
 from pendbench.scene import Scene
@@ -73,7 +73,7 @@ class _Run:
 
     def advance(self, steps: int) -> None:
         self._taken += steps
-        with quiet(), self._forces:
+        with alone(), self._forces:
             while steps > 0:
                 mujoco.mj_step(self._model, self._data, nstep=min(steps, _MOST_STEPS_A_CALL))
                 steps -= _MOST_STEPS_A_CALL

@@ -24,18 +24,16 @@ def applied_forces(scene: Scene) -> AbstractContextManager[None]:
 
 
 class _Applied(AbstractContextManager[None]):
-    """MuJoCo has one such callback for the whole process; the user's own is put back afterwards."""
+    """MuJoCo has one such callback for the whole process; within `mjcf.alone` it is free."""
 
     def __init__(self, callback: Callback) -> None:
         self._callback = callback
-        self._before: Callback | None = None
 
     def __enter__(self) -> None:
-        self._before = mujoco.get_mjcb_passive()
         mujoco.set_mjcb_passive(self._callback)
 
     def __exit__(self, *_: object) -> None:
-        mujoco.set_mjcb_passive(self._before)
+        mujoco.set_mjcb_passive(None)
 
 
 def _callback(scene: Scene) -> Callback:
@@ -48,7 +46,8 @@ def _callback(scene: Scene) -> Callback:
             x, y = acting.pivot_acceleration(scene, data.time)
             model.opt.gravity[:] = -x, 0.0, -y
         if pushed:
-            torques = acting.generalized_forces(forced, data.time, np.cumsum(data.qpos), np.cumsum(data.qvel))
-            data.qfrc_passive[:] += unit * np.cumsum(torques[::-1])[::-1]
+            with np.errstate(all="ignore"):  # a run that blows up is seen in its state
+                torques = acting.generalized_forces(forced, data.time, np.cumsum(data.qpos), np.cumsum(data.qvel))
+                data.qfrc_passive[:] += unit * np.cumsum(torques[::-1])[::-1]
 
     return apply

@@ -1,0 +1,266 @@
+"""The Lagrangian of three links with every effect, by computer algebra, and the forms of it that the project has.
+
+Written in the frame of the ground, with rods integrated along their length and forces by virtual work: nothing of the
+effects' laws is used.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+
+from effect_sets import GRAVITY, MIXED, SETS, given
+from pendbench.compiled import compiled
+from pendbench.physics import acting, dense, extended_effects, recursion
+from pendbench.solvers.extrapolation import extended_derivative
+from scenes import chain, random_chain
+
+N = 3
+LINKS = range(N)
+ANGLE = sp.symbols(f"theta1:{N + 1}")
+RATE = sp.symbols(f"omega1:{N + 1}")
+MASS, LENGTH, ROD, SPRING, DAMPER = (sp.symbols(f"{name}1:{N + 1}") for name in ("m", "l", "mu", "k", "c"))
+G, LINEAR, QUADRATIC, TIME = sp.symbols("g d1 d2 t")
+SHAKE = sp.symbols("ax ay")  # the pivot's amplitudes
+SHAKE_FREQUENCY, MOTOR_FREQUENCY = sp.symbols("w wm")
+MOTOR = sp.symbols(f"tau1:{N + 1}")
+PARAMETERS = (
+    *MASS,
+    *LENGTH,
+    *ROD,
+    *SPRING,
+    *DAMPER,
+    G,
+    LINEAR,
+    QUADRATIC,
+    *SHAKE,
+    SHAKE_FREQUENCY,
+    *MOTOR,
+    MOTOR_FREQUENCY,
+)
+
+
+def in_motion(expression):
+    """How fast an expression in time and angles changes."""
+    return sum((sp.diff(expression, ANGLE[j]) * RATE[j] for j in LINKS), sp.diff(expression, TIME))
+
+
+@cache
+def joints():
+    """Where the pivot and the masses are, in the frame of the ground."""
+    places = [sp.Matrix(SHAKE) * sp.sin(SHAKE_FREQUENCY * TIME)]
+    for angle, length in zip(ANGLE, LENGTH, strict=True):
+        places.append(places[-1] + length * sp.Matrix([sp.sin(angle), -sp.cos(angle)]))
+    return places
+
+
+def bend(i):
+    return ANGLE[i] - (ANGLE[i - 1] if i else 0)
+
+
+@cache
+def lagrangian():
+    along = sp.Symbol("s")
+    total = 0
+    for i in LINKS:
+        point = joints()[i + 1]
+        piece = joints()[i] + along * (joints()[i + 1] - joints()[i])
+        for mass, place in ((MASS[i], point), (ROD[i], piece)):
+            speed = in_motion(place)
+            density = sp.expand(mass * (speed.dot(speed) / 2 - G * place[1]))
+            total += sp.integrate(density, (along, 0, 1)) if mass is ROD[i] else density
+        total -= SPRING[i] * bend(i) ** 2 / 2
+    return total
+
+
+@cache
+def forces(i):
+    """What has no potential, as a force on angle i, by virtual work."""
+    total = 0
+    for k in LINKS:
+        place = joints()[k + 1]
+        speed = in_motion(place)
+        drag = -(LINEAR + QUADRATIC * sp.sqrt(speed.dot(speed))) * speed
+        total += drag.dot(sp.diff(place, ANGLE[i]))
+        torque = MOTOR[k] * sp.sin(MOTOR_FREQUENCY * TIME) - DAMPER[k] * in_motion(bend(k))
+        total += torque * sp.diff(bend(k), ANGLE[i])
+    return total
+
+
+@cache
+def equations(numbers="numpy"):
+    """A function that gives the matrix and the right side of the equations for the accelerations."""
+    momenta = [sp.diff(lagrangian(), rate) for rate in RATE]
+    matrix = sp.Matrix(N, N, lambda i, j: sp.diff(momenta[i], RATE[j]))
+    right = [forces(i) + sp.diff(lagrangian(), ANGLE[i]) - in_motion(momenta[i]) for i in LINKS]
+    return sp.lambdify((*PARAMETERS, *ANGLE, *RATE, TIME), [matrix, right], numbers, cse=True)
+
+
+def arguments(scene, values, theta, omega, t):
+    """What `equations` want: the numbers of the chain, of its effects, and of its state."""
+
+    def each(name):
+        return np.broadcast_to(values.get(name, 0.0), N)
+
+    air = values.get("air_drag", {})
+    shaken = {"axis": "x", "amplitude": 0.0, "angular_frequency": 1.0, **values.get("driven_pivot", {})}
+    shake = np.where(np.array(["x", "y"]) == shaken["axis"], shaken["amplitude"], 0.0)
+    motor = {"joint": 1, "amplitude": 0.0, "angular_frequency": 1.0, **values.get("drive_torque", {})}
+    chain = (*scene.masses, *scene.lengths, *each("rod_mass"), *each("joint_stiffness"), *each("joint_damping"))
+    pushed = (values.get("gravity", 0.0), air.get("linear", 0.0), air.get("quadratic", 0.0))
+    driven = (*shake, shaken["angular_frequency"], *(motor["amplitude"] * np.eye(N)[motor["joint"] - 1]))
+    return (*chain, *pushed, *driven, motor["angular_frequency"], *theta, *omega, t)
+
+
+def derived(scene, values, state):
+    """The accelerations (n,) that follow from the Lagrangian."""
+    matrix, right = equations()(*arguments(scene, values, *state))
+    return np.linalg.solve(np.array(matrix, dtype=float), np.array(right, dtype=float))
+
+
+def drawn(names, n, rng):
+    """Values of these effects for n links: lists where there may be one, with a massless rod or a free joint in it."""
+
+    def each():
+        numbers = rng.uniform(0.1, 2.0, n)
+        numbers[rng.integers(n)] *= float(n == 1)
+        return numbers.tolist()
+
+    values = {
+        "gravity": GRAVITY,
+        "joint_damping": each(),
+        "joint_stiffness": each(),
+        "air_drag": {"linear": rng.uniform(0.1, 1.0), "quadratic": rng.uniform(0.1, 1.0)},
+        "rod_mass": each(),
+        "driven_pivot": {"axis": rng.choice(["x", "y"]).item(), "amplitude": 0.3, "angular_frequency": 4.0},
+        "drive_torque": {"joint": int(rng.integers(n)) + 1, "amplitude": 3.0, "angular_frequency": 2.0},
+    }
+    return {name: values[name] for name in names}
+
+
+def cases(names, n, count):
+    """Scenes, the values of their effects, and a state at a time."""
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        values = drawn(names, n, rng)
+        scene = given(random_chain(n, seed, spread=4.0), **values)
+        yield scene, values, (scene.angles, scene.rates, rng.uniform(0.0, 5.0))
+
+
+def assert_same(found, expected, tolerance):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance * np.abs(expected).max())
+
+
+ALL_SETS = [*SETS.values(), *MIXED]
+
+
+@pytest.mark.parametrize("names", ALL_SETS, ids="-".join)
+def test_accelerations_are_the_lagrangian_s(names):
+    for scene, values, state in cases(names, N, 20):
+        expected = derived(scene, values, state)
+        # Measured: 6e-15 and 7e-15.
+        assert_same(dense.accelerations(scene, *state), expected, 1e-13)
+        assert_same(recursion.accelerations(scene, *state), expected, 1e-13)
+
+
+@pytest.mark.parametrize("name", [name for name in SETS if name != "all"])
+def test_every_effect_is_in_the_lagrangian(name):
+    """Otherwise the test above would prove nothing."""
+    for scene, values, state in cases(SETS[name], N, 5):
+        without = {key: value for key, value in values.items() if key != name}
+        found, bare = derived(scene, values, state), derived(scene, without, state)
+        assert np.abs(found - bare).max() > 1e-3 * np.abs(found).max()
+
+
+def test_values_for_each_link_differ_from_link_to_link():
+    """A list's entries are those of its own joints or rods, not of others."""
+    for scene, values, state in cases(SETS["all"], N, 5):
+        expected = dense.accelerations(scene, *state)
+        for name in ("joint_damping", "joint_stiffness", "rod_mass"):
+            turned = given(scene, **{**values, name: values[name][::-1]})
+            if values[name] != values[name][::-1]:
+                assert np.abs(dense.accelerations(turned, *state) - expected).max() > 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 10, 40])
+@pytest.mark.parametrize("names", ALL_SETS, ids="-".join)
+def test_recursion_is_the_dense_form(names, n):
+    for scene, _, state in cases(names, n, 5):
+        # What the dense solve loses grows with n: measured 8e-14 at n = 40.
+        assert_same(recursion.accelerations(scene, *state), dense.accelerations(scene, *state), 1e-12)
+
+
+@pytest.mark.parametrize("names", [names for names in ALL_SETS if "rod_mass" not in names], ids="-".join)
+def test_newton_holds_for_every_mass(names):
+    """Mass times acceleration against free fall is the pull of two rods and what pushes: no matrix, no recursion."""
+    for scene, _, (theta, omega, t) in cases(names, 9, 3):
+        angular = recursion.accelerations(scene, theta, omega, t)
+        pull = np.append(recursion.tensions(scene, theta, omega, t), 0.0)[:, None]
+        along = np.stack([np.sin(theta), -np.cos(theta)], axis=-1)
+        across = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+        rods = scene.lengths[:, None] * (angular[:, None] * across - omega[:, None] ** 2 * along)
+        left = scene.masses[:, None] * (np.cumsum(rods, axis=0) + acting.pivot_acceleration(scene, t))
+        pulls = pull[1:] * np.append(along[1:], [[0.0, 0.0]], axis=0) - pull[:-1] * along
+        assert_same(left, pulls + acting.mass_forces(scene, t, theta, omega), 1e-13)
+
+
+def test_two_rods_are_the_textbook_s():
+    """The double pendulum of two equal uniform rods and nothing else: Wikipedia, "Double pendulum"."""
+    rod, length, g = 2.0, 0.7, GRAVITY
+    for seed in range(10):
+        a, b, wa, wb = np.random.default_rng(seed).uniform(-3.0, 3.0, 4)
+        scene = given(chain(2, angle=[a, b], rate=[wa, wb], length=length, mass=1e-20), gravity=g, rod_mass=rod)
+        matrix = np.array([[8.0, 3.0 * np.cos(a - b)], [3.0 * np.cos(a - b), 2.0]]) / 6.0
+        right = -0.5 * np.array(
+            [wb**2 * np.sin(a - b) + 3 * g / length * np.sin(a), -(wa**2) * np.sin(a - b) + g / length * np.sin(b)]
+        )
+        assert_same(recursion.accelerations(scene, [a, b], [wa, wb]), np.linalg.solve(matrix, right), 1e-13)
+
+
+# The reference's two forms, in 32 digits
+
+
+@compiled
+def _extended(system, y, dy):
+    extended_derivative(system, y, dy)
+
+
+def extended_accelerations(form, scene, state):
+    """theta'' as (n, 2): high and low parts."""  # noqa: D403
+    system, y = form(scene)
+    y[-1, 0] = state[2]
+    dy = np.empty_like(y)
+    _extended(system, y, dy)
+    np.testing.assert_array_equal(dy[: scene.n], y[scene.n : -1])
+    np.testing.assert_array_equal(dy[-1], [1.0, 0.0])
+    return dy[scene.n : -1]
+
+
+@pytest.mark.parametrize("names", SETS.values(), ids="-".join)
+def test_both_sides_of_the_reference_have_the_same_accelerations(names):
+    for n in (1, 2, 3, 10):
+        for scene, _, state in cases(names, n, 3):
+            forms = extended_effects.recursive_form, extended_effects.dense_form
+            first, second = (extended_accelerations(form, scene, state) for form in forms)
+            largest = np.abs(first[:, 0]).max()
+            # Measured: 1e-30, and 8e-15 for what doubles make of it.
+            assert np.abs((first - second).sum(axis=1)).max() < 1e-28 * largest
+            assert_same(first[:, 0], recursion.accelerations(scene, *state), 1e-13)
+            assert np.abs(first[:, 1]).max() > 1e-20 * largest  # the low parts are there
+
+
+@pytest.mark.parametrize("names", SETS.values(), ids="-".join)
+def test_thirty_digits_agree(names):
+    """The two sides share the effects' laws; the Lagrangian in 40 digits does not."""
+    for scene, values, state in cases(names, N, 2):
+        found = extended_accelerations(extended_effects.recursive_form, scene, state)
+        with mpmath.workdps(40):
+            matrix, right = equations("mpmath")(*map(mpmath.mpf, map(float, arguments(scene, values, *state))))
+            expected = mpmath.lu_solve(mpmath.matrix(matrix), mpmath.matrix(right))
+            sums = [mpmath.mpf(high) + mpmath.mpf(low) for high, low in found.tolist()]
+            errors = [abs(a - b) for a, b in zip(sums, expected, strict=True)]
+            assert max(errors) < 1e-29 * max(map(abs, expected))  # measured: 3e-32
