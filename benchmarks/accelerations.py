@@ -27,7 +27,7 @@ from scipy.linalg import LinAlgError
 import pendbench as pb
 from pendbench.arrays import FloatArray
 from pendbench.compiled import compiled
-from pendbench.engines.mjcf import compile_chain, joint_values, quiet
+from pendbench.engines.mjcf import alone, compile_chain, joint_values
 from pendbench.physics import dense
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance
@@ -228,7 +228,7 @@ def speed_table() -> None:
 
 def mujoco_accelerations(scene: Scene) -> FloatArray:
     """The rods' angular accelerations (n,) as MuJoCo has them."""
-    with quiet():
+    with alone():
         model, data = mujoco_data(scene)
         mujoco.mj_forward(model, data)
     found: FloatArray = np.cumsum(data.qacc)

@@ -67,9 +67,9 @@ def chain(n: int) -> Scene:
     return Scene("chain", "", 1.0, each, each, np.linspace(0.0, 2.0, n), np.ones(n), Effects(gravity=9.81))
 
 
-def per_link(call: Callable[[int], None], links: int) -> float:
+def per_link(call: Callable[[int], None], links: float) -> float:
     """The median time, ns, for each link of a call that is told how often to repeat itself."""
-    times = max(1, SAMPLE_LINKS // links)
+    times = max(1, round(SAMPLE_LINKS / links))
     call(1)
     samples = []
     for _ in range(REPEATS):
@@ -102,8 +102,8 @@ def many(n: int) -> tuple[float, float]:
         def both(times: int) -> None:
             list(pool.map(lambda each: side_by_side(*each, times), mine))
 
-        two = per_link(both, n * LANES)
-    return one, 2.0 * one / two
+        two = per_link(both, n * LANES / 20)  # as many times longer: threads take a while to start
+    return one, 2.0 * one / (two / 20)
 
 
 def main() -> None:

@@ -176,7 +176,7 @@ def test_refuses_chains_that_take_too_long_to_compile():
 def test_refuses_an_effect_that_it_does_not_know():
     damped = dataclasses.replace(chain(2), effects=Effects(gravity=9.81, joint_damping=0.1))
     assert refusal(ENGINE, "taylor", chain(2)) is None
-    assert refusal(ENGINE, "taylor", damped) .startswith("no joint_damping: the adapter")
+    assert refusal(ENGINE, "taylor", damped).startswith("no joint_damping: the adapter")
 
 
 def test_without_heyoka_the_message_is_the_command_that_brings_it(monkeypatch):

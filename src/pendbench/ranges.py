@@ -57,7 +57,7 @@ class EachOf:
         """
         if isinstance(value, np.ndarray):
             value = value.tolist()
-        if not isinstance(value, Sequence) or isinstance(value, str):
+        if not isinstance(value, Sequence) or isinstance(value, str | bytes):
             try:
                 return self.range.read(value)
             except ValueError:
@@ -73,7 +73,8 @@ class EachOf:
             raise InputError(f"entry {number} is {show(entry)}; allowed: {self.range}") from None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """As for `Range`."""
+        """As for `Range`; a wrong entry of a list is told with its number."""
         from pydantic_core import core_schema
 
-        return core_schema.no_info_plain_validator_function(self.read)
+        one = core_schema.no_info_plain_validator_function(self.range.read)
+        return core_schema.union_schema([one, core_schema.list_schema(one, min_length=1, strict=True)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any, ClassVar, Generic, TypeVar, get_type_hints
 
 from pendbench.errors import InputError, choose
@@ -91,6 +92,6 @@ class WholeNumber:
 
     def read(self, value: object) -> int:
         """The number. Raises `ValueError`, saying what is allowed."""
-        if isinstance(value, bool) or not isinstance(value, int) or value < self.low:
+        if isinstance(value, bool) or not isinstance(value, Integral) or value < self.low:
             raise ValueError(str(self))
-        return value
+        return int(value)

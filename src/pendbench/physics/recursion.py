@@ -21,7 +21,7 @@ from pendbench.solvers.copying import copy
 __all__ = ["accelerations", "inwards", "outwards", "system_of", "tensions", "write_accelerations"]
 
 # The rows of a system's scratch. Outwards, each link's tension takes the place of the cosine it no longer needs.
-_OWN, _PASSED, _ACROSS, _COSINE, _WHOLE = range(5)
+_OWN, _PASSED, _ACROSS, _COSINE, _WHOLE, _HELD = range(6)
 _TENSION = _COSINE
 
 # The elimination's fractions are reduced where they have become large. A look at every fourth link will do: each link
@@ -36,6 +36,9 @@ def inwards(system: System, t: float, theta: FloatArray, omega: FloatArray) -> t
     Leaves in `system.scratch`, for each joint between rods i and i+1: the two parts of the mean
     `T_{i+1} = own_i + passed_i T_i`, and `across_i = sin / m_i`, with which T_{i+1} turns into the acceleration of mass
     i across rod i. Returns (alpha_1, beta_1), with which the tension in the first rod is `beta - alpha u.a'`.
+
+    Where forces act on the masses, T is what is left of a rod's tension without the force along it on its own mass,
+    and `held_i / m_i` the acceleration across the rod but for T_i (docs/equations.md, (E44)).
     """
     masses, lengths, ratios = system.masses, system.lengths, system.ratios
     scratch = system.scratch
@@ -46,24 +49,22 @@ def inwards(system: System, t: float, theta: FloatArray, omega: FloatArray) -> t
     whole, loose, moving = 1.0, 1.0, lengths[tip] * omega[tip] ** 2
     if forced:
         forces.write_forces(system, t, theta, omega, _COSINE, _ACROSS)
-        moving = moving + scratch[FORCE_ALONG, tip] * system.inverse_masses[tip]
+        scratch[_HELD, tip] = scratch[FORCE_ACROSS, tip]
     for last in range(tip, 0, -_LOOK):
         for i in range(last - 1, max(last - _LOOK, 0) - 1, -1):
             c, s = scratch[_COSINE, i], scratch[_ACROSS, i]
             scratch[_OWN, i], scratch[_PASSED, i] = masses[i] * moving, c * whole
             scratch[_ACROSS, i] = s * system.inverse_masses[i]
             heavier = ratios[i] * loose
-            loose = heavier + s * s * whole
             if forced:
-                along, across = scratch[FORCE_ALONG, i], scratch[FORCE_ACROSS, i]
-                scratch[_OWN, i] -= whole * (c * along + s * across)
-                pulling = (loose * along - c * s * whole * across) * system.inverse_masses[i]
-            else:
-                pulling = 0.0
+                outer, across = scratch[FORCE_ALONG, i + 1], scratch[FORCE_ACROSS, i]
+                scratch[_HELD, i] = s * (scratch[_OWN, i] + heavier * outer) + across * (c * c * whole + heavier)
+                scratch[_OWN, i] -= whole * (outer + s * across)
+                moving = moving + outer * loose * system.inverse_masses[i + 1]
+                moving = moving - s * whole * across * system.inverse_masses[i]
+            loose = heavier + s * s * whole
             whole = whole + heavier
             moving = c * moving + lengths[i] * omega[i] ** 2 * whole
-            if forced:
-                moving = moving + pulling
             scratch[_WHOLE, i] = whole
         if whole > _LARGE:
             share = 1.0 / whole
@@ -72,6 +73,8 @@ def inwards(system: System, t: float, theta: FloatArray, omega: FloatArray) -> t
         share = 1.0 / scratch[_WHOLE, i]
         scratch[_OWN, i] *= share
         scratch[_PASSED, i] *= share
+        if forced:
+            scratch[_HELD, i] *= share
     scratch[_OWN, tip], scratch[_PASSED, tip], scratch[_ACROSS, tip] = 0.0, 0.0, 0.0
     jerked = masses[0] / loose
     return jerked * whole, jerked * moving
@@ -97,12 +100,14 @@ def outwards(system: System, t: float, theta: FloatArray, alpha: float, beta: fl
         c = scratch[_COSINE, i]
         scratch[_TENSION, i] = tension
         following = scratch[_OWN, i] + scratch[_PASSED, i] * tension
-        out[i] = (scratch[_ACROSS, i] * following - start) / lengths[i]
-        start = scratch[_ACROSS, i] * tension
         if forced:
-            pushed = scratch[FORCE_ACROSS, i] * system.inverse_masses[i]
-            out[i] += pushed / lengths[i]
-            start = start + (c * pushed - scratch[_ACROSS, i] * scratch[FORCE_ALONG, i])
+            inverse = system.inverse_masses[i]
+            end = scratch[_HELD, i] * inverse + scratch[_ACROSS, i] * (scratch[_PASSED, i] * tension)
+            out[i] = (end - start) / lengths[i]
+            start = scratch[_ACROSS, i] * tension + c * scratch[FORCE_ACROSS, i] * inverse
+        else:
+            out[i] = (scratch[_ACROSS, i] * following - start) / lengths[i]
+            start = scratch[_ACROSS, i] * tension
         tension = following
 
 
@@ -144,7 +149,7 @@ def accelerations(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: f
     Source: docs/equations.md, the recursion; the same system as `dense.accelerations`. Raises InputError where theta or
     omega does not have one number for each link.
     """
-    return _solved(scene, theta, omega, t)[0]
+    return _solved(scene, theta, omega, t)[1]
 
 
 def tensions(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float = 0.0) -> FloatArray:
@@ -156,14 +161,15 @@ def tensions(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float 
     """
     if np.any(acting.rods(scene)):
         raise InputError("rods have mass; allowed: massless rods, whose tension is the same all along")
-    return _solved(scene, theta, omega, t)[1]
+    system, _ = _solved(scene, theta, omega, t)
+    return system.scratch[_TENSION] + (system.scratch[FORCE_ALONG] if system.joints or system.drags else 0.0)
 
 
-def _solved(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float) -> tuple[FloatArray, FloatArray]:
+def _solved(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float) -> tuple[Any, FloatArray]:
     system, out = system_of(scene), np.empty(scene.n)
     angles, rates = _each_link("theta", theta, scene.n), _each_link("omega", omega, scene.n)
     _accelerations(system, float(t), angles, rates, out)
-    return out, system.scratch[_TENSION]
+    return system, out
 
 
 def _each_link(name: str, values: npt.ArrayLike, n: int) -> FloatArray:

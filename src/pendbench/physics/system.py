@@ -14,8 +14,8 @@ from pendbench.effects.term import Term
 from pendbench.physics import acting
 from pendbench.scene import Scene
 
-# The rows of a system's scratch: those of the recursion, and those of the forces on the masses, where there are any.
-_ROWS, _ROWS_OF_FORCES = 7, 3
+# The rows of a system's scratch: those of the bare recursion, and of one with forces on the masses or heavy rods.
+_BARE_ROWS, _ROWS = 5, 10
 
 
 class System(NamedTuple):
@@ -68,7 +68,7 @@ def system_of(scene: Scene) -> System | RodSystem:
         "drags": drags,
     }
     heavy = bool(_with(terms, "rod_masses"))
-    scratch = np.empty((_ROWS + (_ROWS_OF_FORCES if joints or drags or heavy else 0), scene.n))
+    scratch = np.empty((_ROWS if joints or drags or heavy else _BARE_ROWS, scene.n))
     if heavy:
         return RodSystem(
             masses=acting.lumped_masses(scene),

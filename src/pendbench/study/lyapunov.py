@@ -10,6 +10,7 @@ import numpy as np
 from pendbench.arrays import FloatArray
 from pendbench.engines.analytic import AnalyticEngine
 from pendbench.engines.protocol import AdaptiveSimulation
+from pendbench.physics.acting import check_plain
 from pendbench.scene import Scene
 
 _APART = 1e-7  # rad: small enough to stay linear, large enough above the solver's own errors
@@ -40,8 +41,10 @@ def lyapunov_exponent(scene: Scene, seconds: float) -> Exponent:
     rate at which they part (Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15, 1980). Distances mix angles and rates
     in units of sqrt(g / L). Regular motion parts linearly in time, which looks like a rate of ln(T) / T: a rate is
     called chaotic above three times that, and above three times its standard error. A single pendulum never is: its
-    energy leaves it no room, however unstable its upper equilibrium.
+    energy leaves it no room, however unstable its upper equilibrium. Raises InputError where more than gravity acts:
+    each interval begins at time 0.
     """
+    check_plain(scene, "this exponent")
     gravity = scene.effects.gravity or 1.0
     swing = math.sqrt(gravity / scene.total_length)
     weight = np.concatenate([np.ones(scene.n), np.full(scene.n, 1.0 / swing)])
