@@ -162,7 +162,9 @@ def tensions(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float 
     if np.any(acting.rods(scene)):
         raise InputError("rods have mass; allowed: massless rods, whose tension is the same all along")
     system, _ = _solved(scene, theta, omega, t)
-    return system.scratch[_TENSION] + (system.scratch[FORCE_ALONG] if system.joints or system.drags else 0.0)
+    return np.asarray(
+        system.scratch[_TENSION] + (system.scratch[FORCE_ALONG] if system.joints or system.drags else 0.0)
+    )
 
 
 def _solved(scene: Scene, theta: npt.ArrayLike, omega: npt.ArrayLike, t: float) -> tuple[Any, FloatArray]:
