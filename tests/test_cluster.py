@@ -359,7 +359,8 @@ def test_a_cluster_that_is_not_there_is_one_line(where, capsys, monkeypatch, tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_address_of_something_else_is_one_line(cluster, address, capsys):
+def test_an_address_of_something_else_is_one_line(cluster, address, capsys, monkeypatch):
+    monkeypatch.setattr(connect, "_ANSWER_S", 60.0)  # a worker that compiles is slow to answer
     worker = next(iter(cluster.workers.values())).worker_address
     assert "is a Worker of Dask" in refusal(capsys, "--cluster", worker)
     assert "cluster is ''" in refusal(capsys, "--cluster", "")

@@ -73,8 +73,7 @@ class EachOf:
             raise InputError(f"entry {number} is {show(entry)}; allowed: {self.range}") from None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """As for `Range`; a wrong entry of a list is told with its number."""
+        """As for `Range`."""
         from pydantic_core import core_schema
 
-        one = core_schema.no_info_plain_validator_function(self.range.read)
-        return core_schema.union_schema([one, core_schema.list_schema(one, min_length=1, strict=True)])
+        return core_schema.no_info_plain_validator_function(self.read)
