@@ -33,7 +33,7 @@ import numpy as np
 from plugin import Spring
 from pendbench.solvers.explicit import semi_implicit_euler
 q, v = np.array([1.0]), np.array([0.0])
-semi_implicit_euler(Spring(1.0), 0.0, 0.5, q, v, 1)
+semi_implicit_euler(Spring(1.0), 0, 0.5, q, v, 1)
 print(q[0])
 """
 USE_CHAIN = """
@@ -43,7 +43,7 @@ from pendbench.scene import Effects, Scene
 from pendbench.solvers.explicit import semi_implicit_euler
 chain = system_of(Scene("one", "", 1.0, [1.0], [1.0], [0.0], [1.0], Effects(gravity=1.0)))
 q, v = np.array([0.0]), np.array([1.0])
-semi_implicit_euler(chain, 0.0, 0.5, q, v, 1)
+semi_implicit_euler(chain, 0, 0.5, q, v, 1)
 print(q[0])
 """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
 import numpy as np
@@ -71,8 +72,9 @@ def test_a_drive_keeps_its_time_between_calls(name: str, method: str) -> None:
     its, scene = loaded(name), under(SETS["all"], swinging())
     if refusal(its, method, scene):
         pytest.skip("refused")
+    dt = 0.0073  # whose multiples are rounded
     once, often = (
-        pb.simulate(scene, engine=its, method=method, dt=0.01, times=t) for t in ([END], np.arange(1, 51) * 0.01)
+        pb.simulate(scene, engine=its, method=method, dt=dt, times=t) for t in ([50 * dt], np.arange(1, 51) * dt)
     )
     np.testing.assert_array_equal(once.theta[-1], often.theta[-1])
     np.testing.assert_array_equal(once.omega[-1], often.omega[-1])
@@ -181,3 +183,18 @@ def test_an_effect_of_nothing_but_zeros_fits_a_file() -> None:
     still = {**USUAL["driven_pivot"], "amplitude": 0.0}
     plain = given(swinging(), gravity=GRAVITY)
     assert mjcf.write_mjcf(given(plain, gravity=GRAVITY, driven_pivot=still)) == mjcf.write_mjcf(plain)
+
+
+def test_runs_in_threads_keep_their_forces_to_themselves() -> None:
+    scenes = [under(SETS[which], swinging()) for which in ("driven_pivot", "drive_torque", "rod_mass", "air_drag")]
+
+    def end(scene: Scene) -> np.ndarray:
+        run = MUJOCO.build(scene, "rk4", 0.001)
+        for _ in range(20):
+            run.advance(50)
+        return run.state().theta
+
+    with ThreadPoolExecutor(len(scenes)) as threads:
+        together = list(threads.map(end, scenes))
+    for scene, theta in zip(scenes, together, strict=True):
+        np.testing.assert_array_equal(theta, end(scene))

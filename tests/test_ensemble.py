@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -85,6 +86,17 @@ def test_start_that_cannot_be_followed_leaves_the_others_alone():
     assert set(found.status[others]) == {"ok"}
 
 
+@pytest.mark.parametrize("rate", [1e4, 1e6, 1e9])
+def test_fast_spin_is_followed_or_given_up_and_never_endless(rate):
+    """A first step of any length overflows the stages here: what is not finite must shrink the step."""
+    found = pb.simulate_ensemble(DOUBLE, [[0.1, 0.2]] * 3, [[0.0, rate], [1.0, 1.0], [rate, rate]], most_steps=20_000)
+    assert list(found.status) == ["work limit", "ok", "work limit"]
+    short = pb.simulate_ensemble(DOUBLE, [[0.1, 0.2]], [[0.0, rate]], times=[10.0 / rate])
+    one = pb.simulate(DOUBLE.with_start([0.1, 0.2], [0.0, rate]), times=[10.0 / rate])
+    assert list(short.status) == ["ok"]
+    np.testing.assert_allclose(short.theta[0], one.theta, rtol=0, atol=1e-8)
+
+
 def test_progress_is_told_and_can_cancel():
     theta, _ = starts(10_000)
     told = []
@@ -122,6 +134,15 @@ def test_flips_are_those_that_trajectories_show():
         assert math.isinf(first) or first - 0.005 - 1e-6 <= found[each] <= first + 1e-6
 
 
+def test_flip_that_turns_back_within_a_step_is_seen():
+    """Steps of a light tolerance are long: their ends alone miss 11 of these flips, the cubic between them 1."""
+    theta, omega = starts(20_000)
+    scene = replace(DOUBLE, duration=2.0)
+    seen, fine = (pb.first_flips(scene, theta, omega, tolerance=tolerance) for tolerance in (1e-6, 1e-12))
+    assert 0 < np.isfinite(fine).sum() < 20_000
+    assert np.count_nonzero(np.isinf(seen) != np.isinf(fine)) <= 3
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -137,6 +158,11 @@ def test_flips_are_those_that_trajectories_show():
         ({"angles": [[0.1, 0.2]], "method": "rk4", "dt": 0.3, "times": [1.0]}, "whole multiples of dt = 0.3 s"),
         ({"angles": [[0.1, 0.2]], "times": [1.0, 0.5]}, "times is not in order"),
         ({"angles": [[0.1, 0.2]], "tolerance": 0.1}, "tolerance is 0.1; allowed"),
+        ({"angles": [[0.1, 0.2]], "method": "rk4", "dt": 1e-30}, "dt is 1e-30; allowed: 1e-06 or more, for 10000000"),
+        ({"angles": [[0.1, 0.2]], "times": ["x"]}, "times is no list of numbers"),
+        ({"angles": [[0.1, 10**400]]}, "angles is no table of numbers"),
+        ({"angles": [[0.1, 0.2]], "progress": 5}, "progress is 5; allowed: a function"),
+        ({"angles": [[0.1, 0.2]], "most_steps": 0}, "most_steps is 0; allowed: a whole number from 1"),
         ({"angles": [[0.1, 0.2]], "threads": 0}, "threads is 0; allowed: 1 to 1024"),
     ],
 )

@@ -15,7 +15,7 @@ PACKAGE = Path(pendbench.__file__).parent
 #: The house, from the ground up: a module may import from its own floor and from those below.
 FLOORS = (
     ("errors",),
-    ("arrays", "bundled", "compiled", "files", "processes", "strict"),
+    ("arrays", "bundled", "compiled", "files", "processes", "source", "strict"),
     ("connect", "ranges"),
     ("effects",),
     ("scene", "scene_file", "trajectory"),

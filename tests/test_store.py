@@ -14,7 +14,8 @@ import pytest
 
 from pendbench.files import alone_in, write_whole
 from pendbench.study import store as store_module
-from pendbench.study.store import Store, key_of, source_digest
+from pendbench.source import source_digest
+from pendbench.study.store import Store, key_of
 
 KEY, OTHER = key_of("one"), key_of("another")
 RECORD = {"error": 1.5e-9, "reason": "änderung\n", "list": [1, None, True], "none": None}

@@ -78,10 +78,10 @@ def test_gauss_legendre_runs_backwards_to_where_it_came_from(stages: int) -> Non
     system, q = system_of(scene), scene.angles.copy()
     p = written(canonical.write_momenta, scene, scene.angles, scene.rates)
     carry, slopes = np.zeros((2, 4)), np.zeros((2, stages, 4))
-    assert collocate(system, method, 0.0, 1e-3, q, p, carry, slopes, 300) == 300
+    assert collocate(system, method, 0, 1e-3, q, p, carry, slopes, 300) == 300
     assert np.abs(q - scene.angles).max() > 0.1  # it went somewhere
     slopes[:] = 0.0
-    assert collocate(system, method, 0.0, -1e-3, q, p, carry, slopes, 300) == 300
+    assert collocate(system, method, 0, -1e-3, q, p, carry, slopes, 300) == 300
     assert q == pytest.approx(scene.angles, abs=1e-11)
 
 

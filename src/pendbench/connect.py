@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from pendbench.errors import InputError, describe
 from pendbench.processes import deaf_to_interrupts, refuse_without_guard
+from pendbench.source import source_digest
 from pendbench.strict import show
 
 #: In the place of an address: a cluster on this machine, as long as it is needed.
@@ -47,10 +48,23 @@ def connected(cluster: str, workers: int) -> Iterator[Any]:
             client.wait_for_workers(1, timeout=_WORKERS_S)
         except TimeoutError:
             raise InputError(f"cluster {cluster!r} has no workers; start one with: dask worker {address}") from None
+        _check_versions(client, cluster)
         try:
             yield client
         except (distributed.KilledWorker, distributed.comm.CommClosedError, CancelledError, asyncio.CancelledError):
             raise InputError(lost(cluster)) from None
+
+
+def _check_versions(client: Any, cluster: str) -> None:
+    """Raise InputError where a worker has no pendbench, or another than this one."""
+    try:
+        found = client.run(source_digest)
+    except Exception as error:  # whatever keeps a worker from loading what it needs
+        raise InputError(f"cluster {cluster!r}: a worker cannot run pendbench ({describe(error)})") from None
+    for worker, digest in sorted(found.items()):
+        if digest != source_digest():
+            said = f"worker {worker} has another version of pendbench"
+            raise InputError(f"cluster {cluster!r}: {said}; allowed: the same on every machine")
 
 
 def lost(cluster: str) -> str:

@@ -27,9 +27,13 @@ METHODS: Final = ("adaptive", "rk4")
 TOLERANCE: Final = 1e-10
 _TOLERANCES: Final = (1e-15, 1e-2)
 
+# Runs side by side: a whole number of vectors, and enough of them to hide what a division takes.
+_VECTOR: Final = 8
 _LANES: Final = 64
-_CHUNK: Final = 4096
-_MOST_STEPS: Final = 10**9
+# Links of the runs that are handed out together: enough to be worth it, few enough to be told of and to be cancelled.
+_CHUNK_LINKS: Final = 1 << 13
+_MOST_STEPS: Final = 10**7
+_MOST_EVER: Final = 10**15
 _SMALLEST: Final = 1e-12
 
 
@@ -61,6 +65,7 @@ def simulate_ensemble(
     dt: float | None = None,
     times: npt.ArrayLike | None = None,
     tolerance: float = TOLERANCE,
+    most_steps: int = _MOST_STEPS,
     threads: int | None = None,
     cluster: str | None = None,
     progress: Progress | None = None,
@@ -68,19 +73,22 @@ def simulate_ensemble(
     """Run the scene's chain from each of the starts angles (K, n) rad, rates (K, n) rad/s (at rest without them).
 
     times (k,) s, rising; the scene's duration alone where None. method: `adaptive` (dt None), with the local error
-    allowed per step; or `rk4`, whose times must be whole multiples of its step dt, s. threads: one for each processor
+    allowed per step; or `rk4`, whose times must be whole multiples of its step dt, s. A trajectory that needs more than
+    `most_steps` ends with the status `work limit`; `rk4` is refused at once. threads: one for each processor
     where None. cluster: the address of a Dask cluster to run on instead, or `local` for one with as many processes.
     progress(done, K) is called as trajectories are done; whatever it raises cancels the rest.
 
-    Results are those of `simulate` from each start, but for rounding. The states asked for, 16 k K n bytes, are all
-    that grows with K: whoever has no room for them asks for a part of the starts at a time.
+    Results are those of `simulate` from each start, but for rounding. The starts and the states asked for, and a word
+    for each, are all that grows with K: (16 (k + 1) n + 64) K bytes, and 32 n K before the first run, where that is
+    more. Whoever has no room for them asks for a part of the starts at a time.
 
     Raises `InputError`, one line, for whatever cannot be used.
     """
     chosen = scene if isinstance(scene, Scene) else load_scene(scene)
     starts = _starts(chosen, angles, rates)
+    _check_progress(progress)
     asked = _times(times, chosen.duration)
-    make = partial(_runner, chosen, method, dt, asked, tolerance)
+    make = partial(_runner, chosen, method, dt, asked, tolerance, most_steps)
     k, runs, n = len(asked), len(starts), chosen.n
     states, status = np.empty((k, runs, 2 * n)), np.empty(runs, dtype="<U16")
     for low, high, out, how in _in_chunks(make, starts, threads, cluster):
@@ -96,6 +104,7 @@ def first_flips(
     rates: npt.ArrayLike | None = None,
     *,
     tolerance: float = TOLERANCE,
+    most_steps: int = _MOST_STEPS,
     threads: int | None = None,
     cluster: str | None = None,
     progress: Progress | None = None,
@@ -107,10 +116,11 @@ def first_flips(
     """
     chosen = scene if isinstance(scene, Scene) else load_scene(scene)
     starts = _starts(chosen, angles, rates)
+    _check_progress(progress)
     if np.abs(starts[:, : chosen.n]).max(initial=0.0) > math.pi:
         raise InputError("angles: one begins beyond pi; allowed: from -pi to pi")
     end = np.array([chosen.duration])
-    make = partial(_runner, chosen, "adaptive", None, end, tolerance, limit=math.pi, flips=True)
+    make = partial(_runner, chosen, "adaptive", None, end, tolerance, most_steps, limit=math.pi, flips=True)
     found = np.empty(len(starts))
     for low, high, out, _ in _in_chunks(make, starts, threads, cluster):
         found[low:high] = out
@@ -136,9 +146,10 @@ def _pool(threads: int | None, cluster: str | None) -> Iterator[tuple[Executor, 
 def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None, cluster: str | None) -> Iterator[Any]:
     """The results of chunks of the starts, in order; a generator that is closed cancels those that have not begun."""
     make()  # what cannot be used is refused before anything runs
-    bounds = ((low, min(low + _CHUNK, len(starts))) for low in range(0, len(starts), _CHUNK))
     waiting: list[tuple[int, int, Any]] = []
     with _pool(threads, cluster) as (pool, workers):
+        size = _chunk(*starts.shape, workers)
+        bounds = ((low, min(low + size, len(starts))) for low in range(0, len(starts), size))
         try:
             while True:
                 for low, high in itertools.islice(bounds, 2 * workers - len(waiting)):
@@ -152,6 +163,22 @@ def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None,
                 future.cancel()
 
 
+def _chunk(runs: int, d: int, workers: int) -> int:
+    """How many of the runs, of d numbers each, are handed out together: whole lanes, and some for every worker."""
+    most = min(2 * _CHUNK_LINKS // d, math.ceil(runs / workers))
+    return max(1, math.ceil(most / _LANES)) * _LANES
+
+
+def _lanes(runs: int) -> int:
+    """How many lanes so many runs can use."""
+    return min(_LANES, math.ceil(runs / _VECTOR) * _VECTOR)
+
+
+def _check_progress(progress: object) -> None:
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress is {show(progress)}; allowed: a function of how many are done, and of how many")
+
+
 def _run_chunk(make: Callable[[], Run], starts: FloatArray) -> tuple[Any, Any]:
     """Make what runs some starts where they are to be run: it cannot travel itself."""
     return make()(starts)
@@ -163,6 +190,7 @@ def _runner(
     dt: float | None,
     times: FloatArray,
     tolerance: float,
+    most_steps: int,
     limit: float = math.inf,
     *,
     flips: bool = False,
@@ -174,8 +202,10 @@ def _runner(
         raise InputError(
             f"tolerance is {show(tolerance)}; allowed: a number from {_TOLERANCES[0]:g} to {_TOLERANCES[1]:g}"
         )
+    if type(most_steps) is not int or not 1 <= most_steps <= _MOST_EVER:
+        raise InputError(f"most_steps is {show(most_steps)}; allowed: a whole number from 1 to {_MOST_EVER:g}")
     if method == "rk4":
-        return _fixed_runner(scene, dt, times)
+        return _fixed_runner(scene, dt, times, most_steps)
     if dt is not None:
         raise InputError(f"dt is {show(dt)}; allowed: none, since method 'adaptive' chooses its steps")
     from pendbench.physics.many import many_system_of  # compiles or loads the kernels
@@ -188,8 +218,9 @@ def _runner(
     def run(starts: FloatArray) -> tuple[Any, Any]:
         out = np.full((len(times), len(starts), 2 * scene.n), np.nan)
         outcomes, stopped = np.zeros(len(starts), np.int64), np.zeros(len(starts))
-        system, limits = many_system_of(scene, _LANES), (tolerance, relative, _SMALLEST, _MOST_STEPS)
-        integrate_many(system, DOP853, starts, times, *limits, _LANES, out, outcomes, stopped, limit)
+        lanes, limits = _lanes(len(starts)), (tolerance, relative, _SMALLEST, most_steps)
+        system = many_system_of(scene, lanes)
+        integrate_many(system, DOP853, starts, times, *limits, lanes, out, outcomes, stopped, limit)
         if flips:
             return np.where(outcomes == CROSSED, stopped, np.where(outcomes == 0, np.inf, np.nan)), None
         return out, _words(outcomes)
@@ -197,20 +228,23 @@ def _runner(
     return run
 
 
-def _fixed_runner(scene: Scene, dt: float | None, times: FloatArray) -> Run:
+def _fixed_runner(scene: Scene, dt: float | None, times: FloatArray, most_steps: int) -> Run:
     from pendbench.physics.many import many_system_of
     from pendbench.solvers.many import runge_kutta_many
     from pendbench.solvers.tableaux import RK4
 
     if not isinstance(dt, float) or not 0.0 < dt <= float(times[-1]):
         raise InputError(f"dt is {show(dt)}; allowed: a step, s, of at most {times[-1]:g}")
+    if times[-1] / dt > most_steps:
+        raise InputError(f"dt is {dt:g}; allowed: {times[-1] / most_steps:g} or more, for {most_steps} steps at most")
     counts = np.rint(times / dt)
     if np.abs(times / dt - counts).max() > 1e-6:
         raise InputError(f"times: allowed: whole multiples of dt = {dt:g} s")
 
     def run(starts: FloatArray) -> tuple[Any, Any]:
         out = np.empty((len(times), len(starts), 2 * scene.n))
-        runge_kutta_many(many_system_of(scene, _LANES), RK4, starts, counts.astype(np.int64), dt, _LANES, out)
+        lanes = _lanes(len(starts))
+        runge_kutta_many(many_system_of(scene, lanes), RK4, starts, counts.astype(np.int64), dt, lanes, out)
         whole = np.isfinite(out).all(axis=(0, 2))
         return out, np.where(whole, "ok", "not finite")
 
@@ -235,7 +269,7 @@ def _starts(scene: Scene, angles: npt.ArrayLike, rates: npt.ArrayLike | None) ->
 def _table(name: str, values: npt.ArrayLike, n: int, allowed: Any) -> FloatArray:
     try:
         table = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} is no table of numbers; allowed: shape (K, {n})") from None
     if table.ndim != 2 or table.shape[1] != n or not len(table):
         raise InputError(f"{name} has shape {table.shape}; allowed: (K, {n}), a row for each start")
@@ -247,7 +281,10 @@ def _table(name: str, values: npt.ArrayLike, n: int, allowed: Any) -> FloatArray
 
 
 def _times(times: npt.ArrayLike | None, duration: float) -> FloatArray:
-    asked = np.array([duration] if times is None else times, dtype=np.float64)
+    try:
+        asked = np.array([duration] if times is None else times, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError("times is no list of numbers; allowed: finite times from 0 on, s") from None
     if asked.ndim != 1 or not asked.size or not np.isfinite(asked).all() or asked[0] < 0 or np.any(np.diff(asked) <= 0):
         raise InputError("times is not in order; allowed: finite times from 0 on, each later than the one before, s")
     return asked

@@ -57,7 +57,7 @@ class EachOf:
         """
         if isinstance(value, np.ndarray):
             value = value.tolist()
-        if not isinstance(value, Sequence) or isinstance(value, str | bytes):
+        if not isinstance(value, Sequence) or isinstance(value, str | bytes | bytearray):
             try:
                 return self.range.read(value)
             except ValueError:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, cast
 
 import numpy as np
@@ -86,7 +87,7 @@ class Scene:
     @cached_property
     def terms(self) -> Mapping[str, Term]:
         """What acts on the chain, by the effects' names; one whose numbers are all 0 does not, and is not simulated."""
-        return self.effects.terms(self.n)
+        return MappingProxyType(self.effects.terms(self.n))
 
     @property
     def total_length(self) -> float:

@@ -77,6 +77,11 @@ def names() -> tuple[str, ...]:
     return tuple(_kinds())
 
 
+def examples() -> dict[str, Any]:
+    """A value of each effect that shows, by name: see `Term.example`."""
+    return {name: term.example() for name, (_, term) in _kinds().items()}
+
+
 def term_classes() -> tuple[type[Any], ...]:
     """The classes of their terms."""
     return tuple(term for _, term in _kinds().values())

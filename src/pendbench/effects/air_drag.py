@@ -33,6 +33,11 @@ class AirDrag(NamedTuple):
         """The term for a chain of n links."""
         return cls(value.linear, value.quadratic)
 
+    @staticmethod
+    def example() -> Any:
+        """Shows in half a second."""
+        return {"linear": 0.3, "quadratic": 0.3}
+
     def is_nothing(self) -> bool:
         """Whether it does nothing."""
         return self.linear == 0.0 == self.quadratic

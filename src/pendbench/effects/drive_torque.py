@@ -40,6 +40,11 @@ class DriveTorque(NamedTuple):
         amplitudes[value.joint - 1] = value.amplitude
         return cls(amplitudes, value.angular_frequency)
 
+    @staticmethod
+    def example() -> Any:
+        """Shows in half a second."""
+        return {"joint": 2, "amplitude": 0.5, "angular_frequency": 3.0}
+
     def is_nothing(self) -> bool:
         """Whether it does nothing."""
         return not self.amplitudes.any()

@@ -40,6 +40,11 @@ class DrivenPivot(NamedTuple):
         x, y = (value.amplitude, 0.0) if along_x else (0.0, value.amplitude)
         return cls(x, y, value.angular_frequency)
 
+    @staticmethod
+    def example() -> Any:
+        """Shows in half a second."""
+        return {"axis": "y", "amplitude": 0.05, "angular_frequency": 10.0}
+
     def is_nothing(self) -> bool:
         """Whether it does nothing."""
         return self.x == 0.0 == self.y

@@ -20,6 +20,11 @@ class Gravity(NamedTuple):
         """The term for a chain of n links."""
         return cls(value)
 
+    @staticmethod
+    def example() -> Any:
+        """Shows in half a second."""
+        return 9.81
+
     def is_nothing(self) -> bool:
         """Whether it does nothing."""
         return self.gravity == 0.0

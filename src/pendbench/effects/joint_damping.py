@@ -21,6 +21,11 @@ class JointDamping(NamedTuple):
         """The term for a chain of n links."""
         return cls(each(value, n, "joint_damping", "joints"))
 
+    @staticmethod
+    def example() -> Any:
+        """Shows in half a second."""
+        return 0.2
+
     def is_nothing(self) -> bool:
         """Whether it does nothing."""
         return not self.damping.any()

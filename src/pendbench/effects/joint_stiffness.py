@@ -24,6 +24,11 @@ class JointStiffness(NamedTuple):
         """The term for a chain of n links."""
         return cls(each(value, n, "joint_stiffness", "joints"))
 
+    @staticmethod
+    def example() -> Any:
+        """Shows in half a second."""
+        return 2.0
+
     def is_nothing(self) -> bool:
         """Whether it does nothing."""
         return not self.stiffness.any()

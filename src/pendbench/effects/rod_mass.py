@@ -21,6 +21,11 @@ class RodMass(NamedTuple):
         """The term for a chain of n links."""
         return cls(each(value, n, "rod_mass", "rods"))
 
+    @staticmethod
+    def example() -> Any:
+        """Shows in half a second."""
+        return 0.5
+
     def is_nothing(self) -> bool:
         """Whether it does nothing."""
         return not self.rods.any()

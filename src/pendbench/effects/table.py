@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from numbers import Integral
 from typing import Any, ClassVar, Generic, TypeVar, get_type_hints
 
-from pendbench.errors import InputError, choose
+from pendbench.errors import InputError, choose, printable
 from pendbench.strict import show
 
 Values = TypeVar("Values", bound="Parameters")
@@ -52,7 +52,7 @@ class TableOf(Generic[Values]):
         if not value:
             raise InputError(f"an empty table; allowed: {', '.join(fields)}")
         if unknown := sorted(str(key) for key in value if key not in fields):
-            raise InputError(choose("key", unknown[0], fields))
+            raise InputError(choose("key", printable(unknown[0][:60])[:60], fields))
         for field in fields.values():
             if field.default is dataclasses.MISSING and field.name not in value:
                 raise InputError(f"missing key '{field.name}'")
@@ -76,7 +76,7 @@ class OneOf:
 
     def read(self, value: object) -> str:
         """The word. Raises `ValueError`, saying which are allowed."""
-        if value not in self.words or not isinstance(value, str):
+        if not isinstance(value, str) or value not in self.words:
             raise ValueError(str(self))
         return value
 

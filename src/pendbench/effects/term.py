@@ -1,9 +1,10 @@
 """What an effect may add to the equations: the laws that its term can have. To add an effect, read this page.
 
-A term is a NamedTuple of floats and arrays (n,). The equations need two things of it:
+A term is a NamedTuple of floats and arrays (n,). It has:
 
 - `of(value, n)`: the term for a chain of n links, from the value in the scene; raises `InputError` if they do not fit.
 - `is_nothing()`: whether all its numbers are 0, so that it can be left out.
+- `example()`: a value as it stands in a file, for the checks that every engine goes through.
 
 and one or more of these laws, static methods in plain arithmetic (`+ - * /`, `np.sin`, `np.cos`, `np.sqrt`), which are
 compiled, and called with numpy arrays, and with numbers of 32 digits:
@@ -21,8 +22,14 @@ compiled, and called with numpy arrays, and with numbers of 32 digits:
 - `rod_masses(term)`: (n,) kg, of uniform rods.
 
 i is an index in a kernel and `...` for numpy, where bend, rate, x and y are arrays (..., n). An effect that pushes in
-none of these ways needs a law more, here and in `physics/laws.py`. Then add the effect's line to `Effects`, its row to
-the table in docs/effects.md, and to each engine that can simulate it (`effects` in its adapter); the others refuse it.
+none of these ways needs a law more, here and in `physics/laws.py`.
+
+Then add the effect's line to `Effects`. The solvers, the energy, the truth and the studies know it from there. An
+engine refuses it until its adapter's `effects` says by what means it simulates it. MuJoCo, pymunk and Pinocchio compute
+what they have no means for from the laws above, so that a line is all they need, and the conformance kit looks at what
+comes of it. `python -m pendbench.engines.effects_table` writes the table of docs/effects.md. What is left is to measure
+it and to hold it: a scene in `models/` and in `studies/effects.toml`, a line in `tests/effect_sets.py`, and what its
+value means in docs/effects.md.
 """
 
 from __future__ import annotations
@@ -41,6 +48,10 @@ class Term(Protocol):
     @classmethod
     def of(cls, value: Any, n: int) -> Term:
         """The term for a chain of n links. Raises `InputError` where the value does not fit them."""
+
+    @staticmethod
+    def example() -> Any:
+        """A value that shows: it changes a chain of about 1 kg and 1 m by a tenth, rad or rad/s, in half a second."""
 
     def is_nothing(self) -> bool:
         """Whether it does nothing: all its numbers are 0."""

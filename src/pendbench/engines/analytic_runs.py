@@ -40,7 +40,7 @@ class RungeKutta:
 
     def advance(self, steps: int) -> None:
         """Take `steps` steps."""
-        explicit.runge_kutta(self._system, self._method, self._taken * self._dt, self._dt, self._y, steps)
+        explicit.runge_kutta(self._system, self._method, self._taken, self._dt, self._y, steps)
         self._taken += steps
 
     def state(self) -> State:
@@ -62,7 +62,7 @@ class SemiImplicitEuler:
 
     def advance(self, steps: int) -> None:
         """Take `steps` steps."""
-        explicit.semi_implicit_euler(self._system, self._taken * self._dt, self._dt, self._q, self._v, steps)
+        explicit.semi_implicit_euler(self._system, self._taken, self._dt, self._q, self._v, steps)
         self._taken += steps
 
     def state(self) -> State:
@@ -171,9 +171,8 @@ class Gauss:
         """Take `steps` steps, or as many as converge."""
         if self._stuck:
             return
-        t = self._taken * self._dt
         taken = gauss.collocate(
-            self._system, self._method, t, self._dt, self._q, self._p, self._carry, self._slopes, steps
+            self._system, self._method, self._taken, self._dt, self._q, self._p, self._carry, self._slopes, steps
         )
         self._taken += taken
         self._stuck = taken < steps

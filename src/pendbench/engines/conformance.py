@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendbench.arrays import FloatArray
+from pendbench.effects import examples as effect_examples
 from pendbench.effects import names as effect_names
 from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Mapped, Simulation, State, refusal
 from pendbench.engines.registry import flaw_of
@@ -39,16 +40,7 @@ _LADDER: Final = (16, 32, 64, 128, 256, 512, 1024)
 _WINDOW: Final = (1e-11, 2e-2)
 _RUNGS: Final = 3
 _SAMPLES: Final = 4
-# Effects that each change the calm chain by a tenth of a radian or a radian a second, and how much of the change an
-# engine may miss: methods of order 1 miss up to 3 % of it at this step.
-_STRENGTHS: Final[Mapping[str, Any]] = {
-    "joint_damping": 0.2,
-    "joint_stiffness": 2.0,
-    "air_drag": {"linear": 0.3, "quadratic": 0.3},
-    "rod_mass": 0.5,
-    "driven_pivot": {"axis": "y", "amplitude": 0.05, "angular_frequency": 10.0},
-    "drive_torque": {"joint": 2, "amplitude": 0.5, "angular_frequency": 3.0},
-}
+# How much of what an effect changes an engine may miss: methods of order 1 miss up to 3 % of it at this step.
 _MISSED: Final = 0.1
 
 Run = Simulation | AdaptiveSimulation
@@ -302,7 +294,7 @@ def _simulates_the_effects_it_maps(engine: Engine, method: str) -> Iterator[str]
     if unknown := sorted(set(mapped) - set(effect_names())):
         yield f"effects has {show(unknown[0])}; allowed: {', '.join(effect_names())}"
         return
-    known = [name for name, means in mapped.items() if name in _STRENGTHS and not means.refused]
+    known = [name for name, means in mapped.items() if name != "gravity" and not means.refused]
     own = engine.methods[method].effects
     names = [name for name in known if own is None or name in own]
     if not names or _misses(engine, method, names) < _MISSED:
@@ -317,7 +309,7 @@ def _simulates_the_effects_it_maps(engine: Engine, method: str) -> Iterator[str]
 
 def _misses(engine: Engine, method: str, names: list[str]) -> float:
     """How far what effects change in the engine is from what they change in truth, as a share of it."""
-    scene = dataclasses.replace(_calm(), effects=Effects(gravity=9.81, **{name: _STRENGTHS[name] for name in names}))
+    scene = dataclasses.replace(_calm(), effects=Effects(gravity=9.81, **{name: effect_examples()[name] for name in names}))
     before, after = (_after(engine, each, method) for each in (_calm(), scene))
     bare, changed = _truth()[1], _solved(scene)[1]
     change = np.concatenate([after.theta - before.theta, after.omega - before.omega])

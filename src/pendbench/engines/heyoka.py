@@ -21,6 +21,7 @@ from typing import Any, Final
 
 import heyoka as hy
 
+from pendbench.effects import names as effect_names
 from pendbench.engines.protocol import AdaptiveSimulation, Fault, Mapped, Method, Setting, State
 from pendbench.scene import Scene
 
@@ -39,8 +40,7 @@ _SETTINGS: Final = {
 _NOTE: Final = "Taylor series of order ceil(1 - ln(tolerance) / 2); the order claimed is that of the default tolerance"
 _METHODS: Final = {"taylor": Method(taylor_order(_TOLERANCE), adaptive=True, settings=_SETTINGS, note=_NOTE)}
 _ALONE: Final = Mapped("the adapter writes the equations of motion under gravity alone", refused=True)
-_OTHERS: Final = ("joint_damping", "joint_stiffness", "air_drag", "rod_mass", "driven_pivot", "drive_torque")
-_EFFECTS: Final = {"gravity": Mapped("in the equations of motion"), **dict.fromkeys(_OTHERS, _ALONE)}
+_EFFECTS: Final = {**dict.fromkeys(effect_names(), _ALONE), "gravity": Mapped("in the equations of motion")}
 _MOST_LINKS: Final = 200  # 15 s to compile, on a busy machine
 _MOST_UNROLLED: Final = 11_000  # n (order^2 + n): unrolled code takes about a millisecond of compiling for each
 

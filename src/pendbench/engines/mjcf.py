@@ -10,9 +10,10 @@ biases the motion by rounding only. `compile_chain` takes the rest of it out as 
 from __future__ import annotations
 
 import math
+import threading
 import warnings
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final, NamedTuple
 
@@ -32,17 +33,16 @@ DEEPEST_FILE: Final = 496
 #: Swinging in the plane x-z, counter-clockwise positive for someone who has x to the right and z up.
 _AXIS: Final = (0.0, -1.0, 0.0)
 _DISABLED: Final = ("constraint", "contact", "spring", "damper", "actuation", "sensor", "autoreset", "gravity")
-# What an effect needs of these. Without springs and dampers MuJoCo does not ask for a user's passive forces either.
-_FLAGS: Final = {
+#: The effects that a model holds, and what each needs of these. The others want forces computed while it runs.
+HELD: Final[Mapping[str, tuple[str, ...]]] = {
     "gravity": ("gravity",),
     "joint_damping": ("damper",),
     "joint_stiffness": ("spring",),
-    "air_drag": ("spring", "damper"),
-    "drive_torque": ("spring", "damper"),
-    "driven_pivot": ("gravity", "spring", "damper"),
+    "rod_mass": (),
 }
-#: The effects that no model can hold: they want forces that are computed while it runs.
-FORCED: Final = ("air_drag", "driven_pivot", "drive_torque")
+# Without springs and dampers MuJoCo does not ask for a user's passive forces either.
+_ASKS: Final = ("spring", "damper")
+_one_at_a_time = threading.RLock()
 _FILE_DT: Final = 1e-3
 # What MuJoCo sets aside by itself is too little for its implicit integrators from some 500 links on; 200 n^2 is enough.
 _MEMORY: Final = (16_000_000, 256)
@@ -61,9 +61,15 @@ _HEAVY: Final = f"that of the rods has {INERTIA:g} too much, which rounding hide
 def alone() -> Iterator[None]:
     """Keep MuJoCo from printing warnings, from writing MUJOCO_LOG.TXT, and from calling the user for passive forces.
 
-    MuJoCo has one of each callback for the whole process. The user's own are put back afterwards, and miss what happens
-    meanwhile: the warnings are counted in the data of the run, where the adapter reads them.
+    MuJoCo has one of each callback for the whole process: other threads wait here. The user's own are put back
+    afterwards, and miss what happens meanwhile: the warnings are counted in the data of the run, where the adapter
+    reads them.
     """
+    with _one_at_a_time:
+        yield from _without_callbacks()
+
+
+def _without_callbacks() -> Iterator[None]:
     warned, pushed = mujoco.get_mju_user_warning(), mujoco.get_mjcb_passive()
     mujoco.set_mju_user_warning(_ignore)
     mujoco.set_mjcb_passive(None)
@@ -81,7 +87,7 @@ def _ignore(text: str) -> None:
 def chain_spec(scene: Scene) -> mujoco.MjSpec:
     """The chain as a MuJoCo model that can be edited further; `compile_chain` makes point masses of it.
 
-    What a model cannot hold (`FORCED`) is left to the adapter. A body's frame is at its joint, so that joint angles are
+    Effects that a model cannot hold (not in `HELD`) are left to the adapter. A body's frame is at its joint, so that joint angles are
     those between neighbouring rods, 0 for a hanging chain.
     """
     spec = mujoco.MjSpec()
@@ -127,11 +133,11 @@ def write_mjcf(scene: Scene) -> str:
 
     MuJoCo's own writer keeps six digits, too few for the same motion; here every number reads back as it was.
 
-    Raises `InputError` for chains of more than `DEEPEST_FILE` links and for effects that no file can hold (`FORCED`).
+    Raises `InputError` for chains of more than `DEEPEST_FILE` links and for effects that no file can hold (not in `HELD`).
     """
     if scene.n > DEEPEST_FILE:
         raise InputError(f"scene {scene.name!r} has {scene.n} links; allowed in an MJCF file: at most {DEEPEST_FILE}")
-    if forced := [name for name in FORCED if name in scene.terms]:
+    if forced := [name for name in scene.terms if name not in HELD]:
         raise InputError(f"scene {scene.name!r} calls for {forced[0]}, which an MJCF file cannot hold")
     root = ET.Element("mujoco", model=printable(scene.name))
     root.append(ET.Comment(_COMMENT.format(advice=_HEAVY if acting.rods(scene).any() else _LIGHT)))
@@ -146,7 +152,7 @@ def write_mjcf(scene: Scene) -> str:
 
 def fits_file(scene: Scene) -> bool:
     """Whether `write_mjcf` can write the scene."""
-    return scene.n <= DEEPEST_FILE and not set(FORCED) & scene.terms.keys()
+    return scene.n <= DEEPEST_FILE and scene.terms.keys() <= HELD.keys()
 
 
 def _add_options(root: ET.Element, scene: Scene) -> None:
@@ -218,7 +224,9 @@ def _each(scene: Scene, effect: str) -> FloatArray:
 
 def _disabled(scene: Scene) -> tuple[str, ...]:
     """What the scene does not call for, by the names that MJCF has for it."""
-    needs = {flag for name, flags in _FLAGS.items() if name in scene.terms for flag in flags}
+    needs = {flag for name in scene.terms for flag in HELD.get(name, _ASKS)}
+    if acting.is_shaken(scene):
+        needs.add("gravity")
     return tuple(flag for flag in _DISABLED if flag not in needs)
 
 

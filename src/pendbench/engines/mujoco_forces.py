@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 import mujoco
 import numpy as np
 
-from pendbench.engines.mjcf import FORCED, mass_unit
+from pendbench.engines.mjcf import HELD, mass_unit
 from pendbench.physics import acting
 from pendbench.scene import Scene
 
@@ -20,7 +20,7 @@ Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 def applied_forces(scene: Scene) -> AbstractContextManager[None]:
     """A context, to be entered as often as wanted, in which MuJoCo adds these forces; an empty one where none act."""
-    return _Applied(_callback(scene)) if set(FORCED) & scene.terms.keys() else nullcontext()
+    return nullcontext() if scene.terms.keys() <= HELD.keys() else _Applied(_callback(scene))
 
 
 class _Applied(AbstractContextManager[None]):
@@ -37,9 +37,8 @@ class _Applied(AbstractContextManager[None]):
 
 
 def _callback(scene: Scene) -> Callback:
-    unit, shaken = mass_unit(scene), "driven_pivot" in scene.terms
-    forced = scene.without("joint_damping", "joint_stiffness")  # MuJoCo has these
-    pushed = "air_drag" in scene.terms or "drive_torque" in scene.terms
+    forced = scene.without(*HELD)
+    unit, shaken, pushed = mass_unit(scene), acting.is_shaken(forced), acting.is_pushed(forced)
 
     def apply(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         if shaken:

@@ -78,15 +78,16 @@ class _Run:
         self._model = chain_model(scene)
         self._data = self._model.createData()
         self._scene, self._no_torques, self._taken = scene, np.zeros(scene.n), 0
-        self._shaken = "driven_pivot" in scene.terms
-        self._pushed = not scene.terms.keys() <= {"gravity", "rod_mass", "driven_pivot"}
+        self._shaken = acting.is_shaken(scene)
+        self._pushed = acting.is_pushed(scene)
         self._q, self._v, self._dt = joint_values(scene.angles), joint_values(scene.rates), dt
-        self._step = {"rk4": self._rk4, "euler": self._euler}[method]
+        self._method = method
 
     def advance(self, steps: int) -> None:
         with np.errstate(all="ignore"):
+            step = {"rk4": self._rk4, "euler": self._euler}[self._method]  # kept, it would keep the run alive
             for _ in range(steps):
-                self._step(self._taken * self._dt)
+                step(self._taken * self._dt)
                 self._taken += 1
 
     def _accelerations(self, t: float, q: FloatArray, v: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Final, NamedTuple, Protocol, runtime_checkable
 
 from pendbench.arrays import FloatArray
 from pendbench.scene import Scene
@@ -104,8 +104,8 @@ class AdaptiveSimulation(Protocol):
 class Engine(Protocol):
     """A program that can simulate scenes.
 
-    It may also have `effects`, a mapping of effects' names to `Mapped`: scenes with others are then refused for it, and
-    the documentation has them in its table. An engine without one decides for itself in `refuses`.
+    It may also have `effects`, a mapping of effects' names to `Mapped`: scenes with others are refused for it, and the
+    documentation has them in its table. An engine without one is taken to know gravity, and nothing else.
     """
 
     name: str
@@ -121,14 +121,17 @@ class Engine(Protocol):
         """A run at time 0 in the scene's start. Never timed. `settings` holds only settings the method declares."""
 
 
+_GRAVITY_ALONE: Final = {"gravity": Mapped("not said")}
+
+
 def refusal(engine: Engine, method: str, scene: Scene) -> str | None:
     """Why the engine cannot simulate the scene with that method, or None."""
-    mapped: Mapping[str, Mapped] | None = getattr(engine, "effects", None)
+    mapped: Mapping[str, Mapped] = getattr(engine, "effects", _GRAVITY_ALONE)
     known = engine.methods[method].effects
     for name in scene.terms:
-        if mapped is not None and name not in mapped:
+        if name not in mapped:
             return f"the adapter has no {name}"
-        if mapped is not None and mapped[name].refused:
+        if mapped[name].refused:
             return f"no {name}: {mapped[name].how}"
         if known is not None and name not in known:
             return f"method {method!r} has no {name}"

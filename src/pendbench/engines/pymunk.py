@@ -170,5 +170,5 @@ class PymunkEngine:
             raise ValueError(f"method {method!r} needs a step")
         chosen = self.methods[method].with_defaults(settings)
         iterations = int(chosen.get("iterations", enough_iterations(scene.n)))
-        run = BodiesRun if "rod_mass" in scene.terms else _Run
+        run = BodiesRun if acting.rods(scene).any() else _Run
         return run(scene, dt, iterations, tuned=method == "tuned")

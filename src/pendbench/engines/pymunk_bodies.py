@@ -31,10 +31,12 @@ class BodiesRun:
         self._inertias = scene.lengths**2 * (rods / 12.0 + scene.masses * (rods / masses) / 4.0)
         self._space = pymunk.Space()
         self._space.iterations = iterations
+        self._space.gravity = self._pull(0.0)
+        self._shaken = acting.is_shaken(scene)
         self._bodies = [pymunk.Body(*pair) for pair in np.stack([masses, self._inertias], axis=1).tolist()]
         self._hang()
         self._last: tuple[FloatArray, FloatArray] | None = None
-        self._pushed = not scene.terms.keys() <= {"gravity", "rod_mass", "driven_pivot"}
+        self._pushed = acting.is_pushed(scene)
 
     def _hang(self) -> None:
         scene, above, anchor = self._scene, self._space.static_body, (0.0, 0.0)
@@ -66,8 +68,8 @@ class BodiesRun:
     def _act(self) -> None:
         """Set what acts during the next step: at its middle in `tuned`, as it is now otherwise."""
         t = (self._taken + (0.5 if self._tuned else 0.0)) * self._dt
-        x, y = acting.pivot_acceleration(self._scene, t)
-        self._space.gravity = (-float(x), -float(y))
+        if self._shaken:
+            self._space.gravity = self._pull(t)
         if not self._pushed:
             return
         theta, omega = self._turning()
@@ -82,6 +84,11 @@ class BodiesRun:
         torques += lever * (np.cos(theta) * drag[:, 0] + np.sin(theta) * drag[:, 1])
         for body, force, torque in zip(self._bodies, drag.tolist(), torques.tolist(), strict=True):
             body.force, body.torque = tuple(force), torque
+
+    def _pull(self, t: float) -> tuple[float, float]:
+        """What a mass weighs at t s in the pivot's frame, over that mass."""
+        x, y = acting.pivot_acceleration(self._scene, t)
+        return -float(x), -float(y)
 
     def _turning(self) -> tuple[FloatArray, FloatArray]:
         angles = np.array([body.angle for body in self._bodies])

@@ -22,8 +22,8 @@ class Forces:
     def __init__(self, scene: Scene, space: pymunk.Space, dt: float, tuned: bool) -> None:
         self._scene, self._space, self._dt, self._tuned = scene, space, dt, tuned
         self._theta = scene.angles
-        self._shaken = "driven_pivot" in scene.terms
-        self._pushed = not scene.terms.keys() <= {"gravity", "driven_pivot"}
+        self._shaken = acting.is_shaken(scene)
+        self._pushed = acting.is_pushed(scene)
         self._last: FloatArray | None = None
 
     def apply(self, t: float) -> None:

@@ -137,6 +137,16 @@ def mass_potential(scene: Scene, places: FloatArray) -> FloatArray:
     return np.asarray(np.sum(lumped_masses(scene) * total, axis=-1))
 
 
+def is_shaken(scene: Scene) -> bool:
+    """Whether the pivot's acceleration changes with time: a constant one has a potential."""
+    return any(not hasattr(term, "mass_potential") for term in _with(scene, "pivot_acceleration"))
+
+
+def is_pushed(scene: Scene) -> bool:
+    """Whether joints or air push the chain."""
+    return bool(_with(scene, "joint_torque") or _with(scene, "drag"))
+
+
 def is_plain(scene: Scene) -> bool:
     """Whether nothing acts but gravity."""
     return scene.terms.keys() <= {"gravity"}

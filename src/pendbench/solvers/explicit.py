@@ -40,13 +40,13 @@ def add_stages(weights: FloatArray, stages: int, h: float, k: FloatArray, out: F
 
 
 @compiled
-def runge_kutta(system: Any, method: Tableau, t: float, dt: float, y: FloatArray, steps: int) -> None:
-    """Take `steps` steps of `dt` from time t, changing y (d,) in place."""
+def runge_kutta(system: Any, method: Tableau, first: int, dt: float, y: FloatArray, steps: int) -> None:
+    """Take the steps from number `first` on, each of `dt`, the one with number 0 at time 0; y (d,) in place."""
     stages, d = len(method.b), len(y)
     k = np.empty((stages, d))
     inner = np.empty(d)
     for step in range(steps):
-        start = t + step * dt
+        start = (first + step) * dt
         for s in range(stages):
             stage_state(method.a, s, dt, y, k, inner)
             derivative(system, start + method.c[s] * dt, inner, k[s])
@@ -57,15 +57,15 @@ def runge_kutta(system: Any, method: Tableau, t: float, dt: float, y: FloatArray
 
 
 @compiled
-def semi_implicit_euler(system: Any, t: float, dt: float, q: FloatArray, v: FloatArray, steps: int) -> None:
-    """Take `steps` steps of `dt` from time t: first the rates v (d,), then with them q (d,), both in place.
+def semi_implicit_euler(system: Any, first: int, dt: float, q: FloatArray, v: FloatArray, steps: int) -> None:
+    """Take steps of `dt` as `runge_kutta` does: first the rates v (d,), then with them q (d,), both in place.
 
     Symplectic for a Hamiltonian whose force does not depend on v; a chain's does, so here it is of order 1 and no more
     (Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1.2).
     """
     a = np.empty_like(q)
     for step in range(steps):
-        acceleration(system, t + step * dt, q, v, a)
+        acceleration(system, (first + step) * dt, q, v, a)
         for i in range(len(q)):
             v[i] += dt * a[i]
             q[i] += dt * v[i]

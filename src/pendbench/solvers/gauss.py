@@ -87,7 +87,7 @@ def _guess(extrapolate: FloatArray, slopes: FloatArray, room: FloatArray) -> Non
 def collocate(
     system: Any,
     method: Collocation,
-    t: float,
+    first: int,
     h: float,
     q: FloatArray,
     p: FloatArray,
@@ -95,7 +95,9 @@ def collocate(
     slopes: FloatArray,
     steps: int,
 ) -> int:
-    """Take steps of h from time t, changing q (d,) and p (d,) in place; return how many converged.
+    """Take the steps from number `first` on, each of h, the one with number 0 at time 0; return how many converged.
+
+    q (d,) and p (d,) are changed in place.
 
     carry (2, d): what rounding left out of q and p. slopes (2, s, d): the rates and forces at the stages of the step
     before, to begin the iteration with. Both are kept between calls. Stops at the first step whose stages do not
@@ -121,7 +123,7 @@ def collocate(
                         change = moved
                     size = max(size, abs(new[i]))
                     rates[s, i] = new[i]
-                generalized_force(system, t + (step + method.c[s]) * h, inner_q, new, forces[s])
+                generalized_force(system, (first + step + method.c[s]) * h, inner_q, new, forces[s])
             # Rounding has the last word: near the end, iterate until the change no longer falls.
             if change == 0.0 or (change <= _NEAR * (1.0 + size) and change >= before):
                 break

@@ -26,6 +26,8 @@ _T, _H, _STEP, _GROW = range(4)
 # And of its work: which run it is at, which time comes next, how many steps it has taken.
 _RUN, _NEXT, _TAKEN = range(3)
 _IDLE = -1
+# Of an interval that holds a crossing: to its rounding.
+_HALVINGS = 50
 
 
 class _Lanes(NamedTuple):
@@ -69,7 +71,7 @@ def _write_worst(part: FloatArray, y: FloatArray, relative: FloatArray, toleranc
         share = relative[i]
         for b in range(part.shape[1]):
             size = abs(part[i, b]) / (tolerance * (1.0 + share * abs(y[i, b])))
-            out[b] = out[b] if size <= out[b] else size  # nan is kept
+            out[b] = size if size > out[b] or np.isnan(size) else out[b]  # nan is kept
 
 
 @inlined
@@ -77,7 +79,7 @@ def _combine(worst5: FloatArray, worst3: FloatArray) -> None:
     """Leave the two estimates, combined as in Hairer's DOP853, in the first."""
     for b in range(len(worst5)):
         together = np.sqrt(worst5[b] * worst5[b] + 0.01 * worst3[b] * worst3[b])
-        worst5[b] = worst5[b] * worst5[b] / together if together > 0.0 else worst5[b]
+        worst5[b] = worst5[b] * worst5[b] / together if together > 0.0 else together
 
 
 @inlined
@@ -85,7 +87,7 @@ def _factors(errors: FloatArray, out: FloatArray) -> None:
     """By how much each step may change: the eighth root, which vectorises as three square roots."""
     for b in range(len(out)):
         wanted = SAFETY / np.sqrt(np.sqrt(np.sqrt(errors[b])))
-        wanted = wanted if wanted < GROW_AT_MOST else GROW_AT_MOST
+        wanted = GROW_AT_MOST if wanted > GROW_AT_MOST else wanted
         out[b] = wanted if wanted > SHRINK_AT_MOST else SHRINK_AT_MOST  # nan shrinks
 
 
@@ -133,7 +135,8 @@ def integrate_many(
 
     outcomes (K,), integers: how each run ended; one that gave up leaves nan where it has no states. stopped (K,): the
     time it reached, s. A run that passes `limit` in one of the first d / 2 components of its state is over: its outcome
-    is CROSSED, and stopped the time of the crossing, from the cubic through the states at both ends of the step. The
+    is CROSSED, and stopped the time of the crossing, from the cubic through the states at both ends of the step, which
+    is also what says that a run passed the limit and came back within one step. The
     other arguments are those of `adaptive.integrate`; method must be of order 8. The system has room for `lanes`.
     """
     d, stages = starts.shape[1], len(method.b)
@@ -212,14 +215,14 @@ def _judge(
 
 @inlined
 def _look_for_crossing(b: int, before: FloatArray, lanes: _Lanes, limit: float, runs: _Runs) -> None:
-    """Where the step of a lane took it past the limit, write down when."""
+    """Where the step of a lane took it past the limit, be it for a moment, write down when."""
     y = lanes.y
     angles, step, earliest = y.shape[0] // 2, lanes.clock[_STEP, b], np.inf
     for i in range(angles):
-        if abs(y[i, b]) > limit:
-            end = limit if y[i, b] > 0.0 else -limit
-            share = _share_of_step(before[i, b], before[angles + i, b], y[i, b], y[angles + i, b], step, end)
-            earliest = min(earliest, share)
+        q0, v0, q1, v1 = before[i, b], step * before[angles + i, b], y[i, b], step * y[angles + i, b]
+        # The cubic stays within the hull of its control points, q0 + v0 / 3 and q1 - v1 / 3 being the inner ones.
+        if max(abs(q1), abs(q0 + v0 / 3.0), abs(q1 - v1 / 3.0)) > limit:
+            earliest = min(earliest, _first_crossing(q0, v0, q1, v1, limit))
     if earliest < np.inf:
         run = lanes.work[_RUN, b]
         runs.outcomes[run] = CROSSED
@@ -227,18 +230,43 @@ def _look_for_crossing(b: int, before: FloatArray, lanes: _Lanes, limit: float, 
 
 
 @compiled_for_threads
-def _share_of_step(q0: float, v0: float, q1: float, v1: float, h: float, end: float) -> float:
-    """Where, as a share of the step h, the cubic with values q and slopes v at its ends first comes to `end`."""
-    low, high = 0.0, 1.0
-    for _ in range(50):
+def _first_crossing(q0: float, v0: float, q1: float, v1: float, limit: float) -> float:
+    """Where, from 0 to 1, the cubic with values q and slopes v at its ends first passes +-limit; inf where nowhere.
+
+    q0 is within the limit. Where q1 is too, the cubic may turn back beyond it, once: it then has its largest value
+    where its slope, of one sign before and of the other after, is 0.
+    """
+    turn = 1.0
+    if abs(q1) <= limit:
+        if v0 * v1 >= 0.0:
+            return np.inf
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            turn = 0.5 * (low + high)
+            low, high = (turn, high) if _slope(q0, v0, q1, v1, turn) * v0 > 0.0 else (low, turn)
+    furthest = _cubic(q0, v0, q1, v1, turn)
+    if abs(furthest) <= limit:
+        return np.inf
+    side = 1.0 if furthest > 0.0 else -1.0
+    low, high = 0.0, turn
+    for _ in range(_HALVINGS):
         s = 0.5 * (low + high)
-        r = 1.0 - s
-        q = r * r * (1.0 + 2.0 * s) * q0 + s * s * (3.0 - 2.0 * s) * q1 + s * r * h * (r * v0 - s * v1)
-        if (q - end) * (q1 - end) > 0.0:
-            high = s
-        else:
-            low = s
+        low, high = (low, s) if side * _cubic(q0, v0, q1, v1, s) > limit else (s, high)
     return high
+
+
+@inlined
+def _cubic(q0: float, v0: float, q1: float, v1: float, s: float) -> float:
+    """Hermite's cubic at s, from 0 to 1."""
+    r = 1.0 - s
+    return r * r * (1.0 + 2.0 * s) * q0 + s * s * (3.0 - 2.0 * s) * q1 + s * r * (r * v0 - s * v1)
+
+
+@inlined
+def _slope(q0: float, v0: float, q1: float, v1: float, s: float) -> float:
+    """The slope of that cubic."""
+    r = 1.0 - s
+    return 6.0 * s * r * (q1 - q0) + r * (1.0 - 3.0 * s) * v0 + s * (3.0 * s - 2.0) * v1
 
 
 @inlined

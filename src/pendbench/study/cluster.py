@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
 from pendbench.connect import connected, lost
 from pendbench.engines.protocol import Fault
 from pendbench.errors import InputError, describe
+from pendbench.source import source_digest
 from pendbench.study.jobs import Job, Outcome
 from pendbench.study.provenance import processor
-from pendbench.study.store import Store, key_of, source_digest
+from pendbench.study.store import Store, key_of
 
 if TYPE_CHECKING:
     from pendbench.study.cluster_worker import Ran

@@ -15,8 +15,9 @@ from distributed.metrics import time
 
 from pendbench.engines.protocol import Fault
 from pendbench.errors import InputError
+from pendbench.source import source_digest
 from pendbench.study.jobs import Job, LocalPool
-from pendbench.study.store import Store, source_digest
+from pendbench.study.store import Store
 
 #: A job as it is sent: what to call, packed; its limits of time and memory.
 Packed = tuple[bytes, float, float | None]

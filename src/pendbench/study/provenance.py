@@ -10,7 +10,7 @@ from typing import Any
 from pendbench import __version__
 from pendbench.study.ask import version
 from pendbench.study.plan import Plan
-from pendbench.study.store import source_digest
+from pendbench.source import source_digest
 
 _LIBRARIES = ("numpy", "scipy", "numba", "pandas")
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")

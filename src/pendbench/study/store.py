@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,25 +12,12 @@ import numpy as np
 
 from pendbench.arrays import FloatArray
 from pendbench.files import write_whole
+from pendbench.source import source_digest
 
 _KEY: Final = "key of these arrays"
 _KEY_LENGTH: Final = 24
 # Also what a write leaves behind that was killed: a dot, the name, and more.
 _OURS: Final = re.compile(rf"[0-9a-f]{{{_KEY_LENGTH}}}\.(json|npz)|\.[0-9a-f]{{{_KEY_LENGTH}}}\.(json|npz)\..+")
-
-
-@cache
-def source_digest() -> str:
-    """A hash of the project's own source: results of other code are not taken for results of this one.
-
-    How results are told is no part of it.
-    """
-    package = Path(__file__).resolve().parents[1]
-    digest = hashlib.sha256()
-    for source in sorted(set(package.rglob("*.py")) - set((package / "report").rglob("*.py"))):
-        digest.update(source.relative_to(package).as_posix().encode())
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def key_of(*parts: object) -> str:

@@ -1,0 +1,105 @@
+"""Someone adds an effect as `effects/term.py` says, in a copy of the project: everything simulates it from there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pendbench
+
+CUBIC_SPRING = """
+from typing import Any, Final, NamedTuple
+
+from pendbench.arrays import FloatArray
+from pendbench.effects.term import each
+from pendbench.ranges import EachOf, Range
+
+CUBIC_SPRING: Final = EachOf(Range(0.0, 1e50, "N m/rad^3"), "joint")
+
+class CubicSpring(NamedTuple):
+    stiffness: FloatArray
+
+    @classmethod
+    def of(cls, value, n):
+        return cls(each(value, n, "cubic_spring", "joints"))
+
+    @staticmethod
+    def example():
+        return 2.0
+
+    def is_nothing(self):
+        return not self.stiffness.any()
+
+    @staticmethod
+    def joint_torque(term, drive, i, bend, rate):
+        return -(term.stiffness[i] * bend * bend * bend)
+
+    @staticmethod
+    def joint_potential(term, i, bend):
+        return 0.25 * term.stiffness[i] * bend * bend * bend * bend
+"""
+IMPORTED = "from pendbench.effects.driven_pivot import"
+LISTED = "    gravity: Annotated"
+ADAPTERS = ("analytic", "mujoco", "pymunk", "pinocchio")
+# What all of them make of it, and what is refused without a line in the adapter.
+USED = """
+import numpy as np
+from pendbench.engines.conformance import _simulates_the_effects_it_maps as check
+from pendbench.engines.protocol import refusal
+from pendbench.engines.registry import engine
+from pendbench.physics import dense, recursion
+from pendbench.scene import load_scene
+
+scene = load_scene("scene.toml")
+args = scene.angles, scene.rates, 0.3
+np.testing.assert_allclose(recursion.accelerations(scene, *args), dense.accelerations(scene, *args), rtol=1e-12)
+assert "cubic_spring" in refusal(engine("heyoka"), "taylor", scene) if HEYOKA else True
+for name, method in (("analytic", "rk4"), ("mujoco", "rk4"), ("pymunk", "tuned"), *([("pinocchio", "rk4")] * PINOCCHIO)):
+    assert refusal(engine(name), method, scene) is None, name
+    print(name, *check(engine(name), method))
+"""
+SCENE = """
+duration = 1
+chain = {masses = [1.0, 0.5], lengths = [1.0, 0.7]}
+start = {angles = [0.3, 0.9]}
+effects = {gravity = 9.81, cubic_spring = [1.0, 2.0]}
+"""
+
+
+@pytest.mark.parametrize("forgotten", [None, "mujoco"])
+def test_an_effect_of_ones_own_needs_its_file_its_line_and_a_line_in_each_adapter(tmp_path, forgotten):
+    package = tmp_path / "pendbench"
+    shutil.copytree(Path(pendbench.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    (package / "effects/cubic_spring.py").write_text(CUBIC_SPRING)
+    page = (package / "effects/__init__.py").read_text()
+    page = page.replace(IMPORTED, f"from pendbench.effects.cubic_spring import CUBIC_SPRING, CubicSpring\n{IMPORTED}", 1)
+    page = page.replace(LISTED, f"    cubic_spring: Annotated[Each, CUBIC_SPRING, CubicSpring] | None = None\n{LISTED}", 1)
+    (package / "effects/__init__.py").write_text(page)
+    for name in ADAPTERS:
+        adapter = package / "engines" / f"{name}.py"
+        line = "" if name == forgotten else '"cubic_spring": Mapped("as it is"), '
+        adapter.write_text(adapter.read_text().replace("_EFFECTS: Final = {", "_EFFECTS: Final = {" + line, 1))
+    (tmp_path / "scene.toml").write_text(SCENE)
+    optional = {name: _there(name) for name in ("pinocchio", "heyoka")}
+    code = USED.replace("PINOCCHIO", str(int(optional["pinocchio"]))).replace("HEYOKA", str(optional["heyoka"]))
+    settings = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=settings, capture_output=True, text=True)
+    if forgotten:
+        assert done.stderr.strip().endswith("AssertionError: mujoco")
+        return
+    assert done.returncode == 0, done.stderr
+    names = [name for name in ADAPTERS if name != "pinocchio" or optional["pinocchio"]]
+    assert done.stdout.split() == names  # no failure beside any
+
+
+def _there(package: str) -> bool:
+    try:
+        __import__(package)
+    except ImportError:
+        return False
+    return True
