@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from pendbench.files import alone_in, write_whole
-from pendbench.study import store as store_module
 from pendbench.source import source_digest
+from pendbench.study import store as store_module
 from pendbench.study.store import Store, key_of
 
 KEY, OTHER = key_of("one"), key_of("another")

@@ -148,7 +148,7 @@ def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None,
     make()  # what cannot be used is refused before anything runs
     waiting: list[tuple[int, int, Any]] = []
     with _pool(threads, cluster) as (pool, workers):
-        size = _chunk(*starts.shape, workers)
+        size = _chunk(len(starts), starts.shape[1], workers)
         bounds = ((low, min(low + size, len(starts))) for low in range(0, len(starts), size))
         try:
             while True:

@@ -22,7 +22,7 @@ class RodMass(NamedTuple):
         return cls(each(value, n, "rod_mass", "rods"))
 
     @staticmethod
-    def example() -> Any:
+    def example() -> float:
         """Shows in half a second."""
         return 0.5
 

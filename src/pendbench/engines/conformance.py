@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -309,7 +309,8 @@ def _simulates_the_effects_it_maps(engine: Engine, method: str) -> Iterator[str]
 
 def _misses(engine: Engine, method: str, names: list[str]) -> float:
     """How far what effects change in the engine is from what they change in truth, as a share of it."""
-    scene = dataclasses.replace(_calm(), effects=Effects(gravity=9.81, **{name: effect_examples()[name] for name in names}))
+    chosen = {name: effect_examples()[name] for name in names}
+    scene = dataclasses.replace(_calm(), effects=Effects(gravity=9.81, **chosen))
     before, after = (_after(engine, each, method) for each in (_calm(), scene))
     bare, changed = _truth()[1], _solved(scene)[1]
     change = np.concatenate([after.theta - before.theta, after.omega - before.omega])

@@ -87,8 +87,8 @@ def _ignore(text: str) -> None:
 def chain_spec(scene: Scene) -> mujoco.MjSpec:
     """The chain as a MuJoCo model that can be edited further; `compile_chain` makes point masses of it.
 
-    Effects that a model cannot hold (not in `HELD`) are left to the adapter. A body's frame is at its joint, so that joint angles are
-    those between neighbouring rods, 0 for a hanging chain.
+    Effects that a model cannot hold (not in `HELD`) are left to the adapter. A body's frame is at its joint, so that
+    joint angles are those between neighbouring rods, 0 for a hanging chain.
     """
     spec = mujoco.MjSpec()
     spec.modelname = printable(scene.name)
@@ -133,7 +133,7 @@ def write_mjcf(scene: Scene) -> str:
 
     MuJoCo's own writer keeps six digits, too few for the same motion; here every number reads back as it was.
 
-    Raises `InputError` for chains of more than `DEEPEST_FILE` links and for effects that no file can hold (not in `HELD`).
+    Raises `InputError` for chains of more than `DEEPEST_FILE` links, and for effects that no file can hold.
     """
     if scene.n > DEEPEST_FILE:
         raise InputError(f"scene {scene.name!r} has {scene.n} links; allowed in an MJCF file: at most {DEEPEST_FILE}")

@@ -395,7 +395,6 @@ COLUMNS: Final = MappingProxyType(
         **_COSTS,
         **_SCALING,
         **_EFFECTS,
-        **_EFFECTS,
         **_ENSEMBLE,
     }
 )

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
+import numpy as np
+
 from pendbench.report import sections
 from pendbench.report.columns import number_text, shown, times_text
 from pendbench.report.effects_plots import balance_figure, price_figure
@@ -60,19 +62,25 @@ def answer(results: Results) -> str:
             parts.append(told)
     text = [f"At the finest step of the study, the best method of each engine: {'; '.join(parts)}."] if parts else []
     for name in distinct(prices, "engine"):
-        alone = [row for row in of(prices, engine=name) if word(row, "effect") not in (_BARE, _ALL, _DEFAULTS)]
+        alone = [row for row in _priced(prices, name) if word(row, "effect") not in (_BARE, _ALL, _DEFAULTS)]
         if alone:
-            dear, cheap = (f(alone, key=lambda row: number(row, "step_price")) for f in (max, min))
-            text.append(
-                f"An effect alone costs {name} from {times_text(number(cheap, 'step_price'))} "
-                f"({word(cheap, 'effect')}, {word(cheap, 'method')}) to {times_text(number(dear, 'step_price'))} "
-                f"({word(dear, 'effect')}, {word(dear, 'method')}) the bare chain's step."
-            )
+            ends = (f(alone, key=lambda row: number(row, "step_price")) for f in (min, max))
+            told = " to ".join(dict.fromkeys(_told_price(row) for row in ends))
+            text.append(f"An effect alone costs {name} {told} the bare chain's step.")
     refused = [row for row in cases if word(row, "status") == "refused"]
     if refused:
         refusals = [f"{name} ({_scenes_of(refused, cases, name)})" for name in pairs(refused)]
         text.append(f"Refused by {listed(refusals)}.")
     return " ".join(text) or "No case of this study ended well."
+
+
+def _priced(prices: Sequence[Row], name: str) -> list[Row]:
+    """An engine's prices that were measured."""
+    return [row for row in of(prices, engine=name) if is_ok(row)]
+
+
+def _told_price(row: Row) -> str:
+    return f"{times_text(number(row, 'step_price'))} ({word(row, 'effect')}, {word(row, 'method')})"
 
 
 def _scenes_of(rows: Sequence[Row], cases: Sequence[Row], name: str) -> str:
@@ -100,6 +108,7 @@ def _best_method(rows: Sequence[Row]) -> list[Row]:
 def pictures(results: Results) -> Iterator[Picture]:
     """The prices of effects, and the balance of energy against the error."""
     prices, cases = records(results.tables.get("prices")), records(results.cases)
+    prices = [row for row in prices if is_ok(row)]
     if prices:
         caption = "The cost of a step with one effect at a time, over that of the chain under gravity alone."
         yield Picture("prices", "", caption, draw(partial(price_figure, Look.of_cases(prices), prices)))
@@ -144,6 +153,7 @@ def markdown_page(results: Results, plots: Sequence[Picture]) -> str:
         *(named[name] for name in ("prices",) if name in named),
         _PRICES,
         _by_effect([row for row in prices if word(row, "effect") != _DEFAULTS]),
+        *_spread(prices),
         *_flags(prices),
         "## What was refused, and what failed",
         sections.failures(cases, scenes),
@@ -190,24 +200,36 @@ def _by_effect(prices: Sequence[Row]) -> str:
 
 def _price(row: Row | None) -> str:
     if row is None:
-        return "refused"
+        return ""
+    if not is_ok(row):
+        return sections.status_text(row, 80)
     return f"{sections.cell(row, 'step_price')} ({sections.cell(row, 'step_us')} µs)"
 
 
+def _spread(prices: Sequence[Row]) -> Iterator[str]:
+    """How far the prices can be trusted."""
+    measured = [row for row in prices if is_ok(row) and number(row, "step_price") > 0]
+    if measured:
+        shares = [number(row, "price_spread") / number(row, "step_price") for row in measured]
+        least = f"{shown('price_spread', float(np.median(shares)))} of it in the median case"
+        yield f"Between the rounds a price varies by {least} and {shown('price_spread', max(shares))} in the worst."
+
+
 def _flags(prices: Sequence[Row]) -> Iterator[str]:
-    rows = of(prices, effect=_DEFAULTS)
+    rows = [row for row in of(prices, effect=_DEFAULTS) if is_ok(row)]
     if rows:
         yield "## What is left on"
         yield _FLAGS
         yield sections.rows_table(rows, ("engine", "method", "step_us", "step_price", "price_spread"))
         dearest = {name: max(_prices(prices, name), default=math.nan) for name in distinct(prices, "engine")}
-        if "analytic" in dearest:
+        if math.isfinite(dearest.get("analytic", math.nan)):
             cost = number_text(dearest["analytic"], ".2f")
-            yield f"A kernel of the analytic engine with every effect left in costs {cost} of the bare one."
+            every = f"all the effects of {markdown(word(prices[0], 'scene'))} in it"
+            yield f"A step of the analytic engine's kernel with {every} costs up to {cost} times the bare one's."
 
 
 def _prices(prices: Sequence[Row], name: str) -> list[float]:
-    return [number(row, "step_price") for row in of(prices, engine=name, effect=_ALL)]
+    return [number(row, "step_price") for row in _priced(prices, name) if word(row, "effect") == _ALL]
 
 
 def _upright(cases: Sequence[Row], scenes: set[str]) -> Iterator[str]:

@@ -26,6 +26,7 @@ GRID_S: Final = 0.01
 _BETWEEN: Final = 20
 _MOST_SAMPLES: Final = 20_000
 _ROUNDS: Final = 3
+_FEWEST: Final = 4  # samples that a spline needs
 
 
 def measure_effect_truth(scene: Scene, times: FloatArray, store: Store, key: str) -> Record:
@@ -48,7 +49,7 @@ def measure_effect(case: Case, truth_key: str, store: Store) -> Record:
         raise LookupError("no truth to compare with")
     run = simulate(case.scene, case.engine, case.method, case.dt, _times(case), **dict(case.settings))
     record: Record = {"status": run.status, "reason": run.reason, "steps": run.steps}
-    if len(run.t) < 4:
+    if len(run.t) < _FEWEST:
         return record
     at = np.searchsorted(run.t, truth["t"] - 1e-9)
     met = at < len(run.t)
@@ -56,8 +57,11 @@ def measure_effect(case: Case, truth_key: str, store: Store) -> Record:
     known = {name: array[met] for name, array in truth.items()}
     offset = (run.theta[at[met]] - known["theta"]) - known["theta_low"]
     with np.errstate(over="ignore", invalid="ignore"):
-        error = distance(case.scene.lengths, known["theta"], offset)
-        record |= {"error_max": float(error.max()), "gap_max": float(run.gap.max())}
+        if np.any(known["t"] > 0.0):
+            record["error_max"] = float(distance(case.scene.lengths, known["theta"], offset).max())
+        else:
+            record["reason"] = record["reason"] or f"no step ends at a multiple of {GRID_S:g} s, where errors are taken"
+        record |= {"gap_max": float(run.gap.max())}
         record |= {"moved_max_rad": float(np.abs(run.theta - case.scene.angles).max())}
         record |= _balance(case.scene, run)
     return record
@@ -78,13 +82,15 @@ def truth_times(scene: Scene) -> FloatArray:
 def _balance(scene: Scene, run: Trajectory) -> Record:
     """How far the energy is from what the effects' power leaves of it, and how well the integral of power is known.
 
-    In units of the scene's energy, or of the largest change where that is larger. The floor is what half of the samples
-    would have given.
+    In units of the scene's energy, or of the largest change where that is larger; nothing where there is no energy, or
+    more than a float can hold. The floor is what half of the samples would have given.
     """
     change = energy(scene, run.theta, run.omega)
     change = change - change[0]
     given = power(scene, run.t, run.theta, run.omega)
     scale = max(energy_scale(scene), float(np.abs(change).max()))
+    if not scale or not np.all(np.isfinite(change)) or not np.all(np.isfinite(given)):
+        return {}
     work = _integral(run.t, given)
     rough = _integral(run.t[::2], given[::2])
     return {

@@ -39,6 +39,7 @@ ALL: Final = "all"
 #: The bare chain with what the engine has on by itself, where that can be asked for.
 DEFAULTS: Final = "bare, default flags"
 
+_NO_PRICE: Final = dict.fromkeys(("step_us", "step_price", "price_spread"), math.nan)
 _FLOOR: Final = 1e-12
 _CEILING: Final = 0.05
 _MEASURED: Final = ("error_max", "balance_error", "balance_floor", "moved_max_rad", "gap_max", "steps")
@@ -122,20 +123,26 @@ class _Effects:
     def _find_prices(self) -> None:
         """Of each engine and method, in one job that measures all chains in turn."""
         jobs: dict[tuple[str, str], Job] = {}
+        asked: dict[tuple[str, str], dict[str, Record]] = {}
         for name, method in dict.fromkeys((case.engine, case.method) for case in self.plan.cases):
             if engine(name).methods[method].adaptive:
                 continue
-            cases = {label: case for label, case in self._priced_cases(name, method) if refusal(case) is None}
+            every = dict(self._priced_cases(name, method))
+            reasons = {label: refusal(case) for label, case in every.items()}
+            asked[name, method] = {label: {"status": "refused", "reason": reason} for label, reason in reasons.items()}
+            cases = {label: case for label, case in every.items() if reasons[label] is None}
             if set(cases) <= {BARE, DEFAULTS}:
                 continue
             content = (*(case.content for case in cases.values()), version(name))
             jobs[name, method] = job_of(measure_prices, content, 4 * self.limit, cases, BARE)
         values = self.runner.run("prices", list(jobs.values()), lambda _, fault: fault_record(fault), alone=True)
         for (name, method), job in jobs.items():
-            found = values[job.key]
-            prices: Mapping[str, Record] = found.get("prices", {})
             where = {"scene": self.priced.name, "n": self.priced.n, "engine": name, "method": method}
-            self.prices += [{**where, "effect": label, **price} for label, price in prices.items()]
+            for label, record in asked[name, method].items():
+                found = record if record["reason"] else values[job.key]
+                price = values[job.key].get("prices", {}).get(label, _NO_PRICE)
+                how = {"status": found["status"], "reason": found["reason"]}
+                self.prices.append({**where, "effect": label, **price, **how})
 
     def _priced_cases(self, name: str, method: str) -> Iterator[tuple[str, Case]]:
         """The chain with each of its effects alone, with all, and bare."""
@@ -147,7 +154,8 @@ class _Effects:
             if effect != "gravity":
                 alone = replace(only_gravity, **{effect: getattr(effects, effect)})
                 yield effect, Case(replace(self.priced, effects=alone), name, method, step)
-        yield ALL, Case(self.priced, name, method, step)
+        if set(effects.named()) - {"gravity"} != {effect}:
+            yield ALL, Case(self.priced, name, method, step)
         if "default_flags" in engine(name).methods[method].settings:
             yield DEFAULTS, Case(bare, name, method, step, (("default_flags", 1),))
 

@@ -8,9 +8,9 @@ from importlib import metadata
 from typing import Any
 
 from pendbench import __version__
+from pendbench.source import source_digest
 from pendbench.study.ask import version
 from pendbench.study.plan import Plan
-from pendbench.source import source_digest
 
 _LIBRARIES = ("numpy", "scipy", "numba", "pandas")
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
