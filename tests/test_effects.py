@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from pendbench.engines.registry import engine
 from pendbench.errors import InputError, MissingEngineError
 from pendbench.physics.system import RodSystem, System, system_of
 from pendbench.scene import Effects, Scene, load_scene
+from pendbench.truth import MOST_WITH_EFFECTS, reference
 from scenes import chain
 
 PER_JOINT = "or a list with one for each joint"
@@ -352,3 +354,11 @@ def test_heyoka_knows_gravity_alone() -> None:
     its = pytest.importorskip("pendbench.engines.heyoka").HeyokaEngine()
     assert all(refusal(its, "taylor", under(("gravity", effect), three())) for effect in EFFECTS)
     assert refusal(its, "taylor", three()) is None
+
+
+def test_a_reference_that_would_take_for_ever_is_refused_at_once() -> None:
+    scene = chain(MOST_WITH_EFFECTS + 1)
+    assert "201 links and more than gravity; allowed for the reference: at most 200" in complaint(
+        reference, dataclasses.replace(scene, effects=Effects(gravity=9.81, joint_damping=0.1)), [1e-9]
+    )
+    assert reference(scene, [1e-9]).status == "ok"

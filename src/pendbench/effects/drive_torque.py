@@ -11,6 +11,7 @@ from pendbench.arrays import FloatArray
 from pendbench.effects.table import Parameters, TableOf, WholeNumber
 from pendbench.errors import InputError
 from pendbench.ranges import Range
+from pendbench.strict import show
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class DriveTorque(NamedTuple):
     def of(cls, value: DriveTorqueValue, n: int) -> DriveTorque:
         """The term for a chain of n links."""
         if value.joint > n:
-            raise InputError(f"drive_torque: joint is {value.joint}; allowed: 1 to {n}, the joints of the chain")
+            raise InputError(f"drive_torque: joint is {show(value.joint)}; allowed: 1 to {n}, the joints of the chain")
         amplitudes = np.zeros(n)
         amplitudes[value.joint - 1] = value.amplitude
         return cls(amplitudes, value.angular_frequency)

@@ -1,4 +1,7 @@
-"""The accelerations of the chain in O(n), from tip to pivot and back, without cancellation (docs/equations.md)."""
+"""The accelerations of the chain in O(n), from tip to pivot and back; under gravity without cancellation.
+
+docs/equations.md derives it, and docs/effects.md says what other effects cost in digits.
+"""
 
 from __future__ import annotations
 
