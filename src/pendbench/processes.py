@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import multiprocessing
 import os
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 
 
@@ -16,6 +18,13 @@ def processors() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:
         return os.cpu_count() or 1
+
+
+def give_memory_back() -> None:
+    """Return what this process has freed to the system, where that can be asked for: its size is then what it uses."""
+    gc.collect()
+    with suppress(OSError, AttributeError):  # of another system than Linux, or another C library than GNU's
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def refuse_without_guard() -> None:

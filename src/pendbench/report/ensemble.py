@@ -76,7 +76,7 @@ def _mapped(ours: Sequence[Row], options: Mapping[str, Any]) -> Row | None:
 
 def _cost(mapped: Row, own: Row, results: Results) -> str:
     run_s, workers = number(mapped, "run_s"), results.provenance.get("worker processes")
-    beside = f", {duration_text(run_s / workers)} with {workers} at a time" if workers and workers > 1 else ""
+    beside = f", {duration_text(run_s / workers)} if {workers} processors share them evenly" if workers and workers > 1 else ""
     chains, duration = number_text(number(mapped, "chains"), ",.0f"), shown("duration_s", own["duration_s"])
     return (
         f"{chains} double pendulums over {duration} s at a tolerance of {shown('tolerance', mapped['tolerance'])} take "
@@ -215,7 +215,7 @@ def _definition(results: Results) -> str:
 
 def _choice(ours: Sequence[Row], options: Mapping[str, Any]) -> str:
     """Which tolerances change no pixel away from the edge."""
-    judged = [row for row in ours if not math.isnan(number(row, "changed_away"))]
+    judged = [row for row in ours if number(row, "pixels") > 0 and number(row, "pixels_failed") == 0]
     good = [number(row, "tolerance") for row in judged if number(row, "changed_away") == 0]
     bad = [number(row, "tolerance") for row in judged if number(row, "changed_away") > 0]
     loosest = max((value for value in good if value < min(bad, default=math.inf)), default=None)

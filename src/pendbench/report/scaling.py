@@ -28,14 +28,18 @@ energy stays within 1 % of its scale (and its rods within 1 % of their lengths) 
 shortest chain beyond it. The length is known to a tenth; the step is one of a ladder, each a third shorter than the one
 before, begun a little coarser than the step of the chain before suggests."""
 _COST: Final = """\
-The median cost of one step. A method that chooses its steps is shown with its own, whose length is its own affair. An
+The median cost of one step, of a chain that starts to fall. A chain of n links gets an n-th of the step of one link, as
+its fastest swing does. A method that chooses its steps is shown with its own, whose length is its own affair. An
 explicit method of four stages evaluates the accelerations four times in a step."""
 _GROWTH: Final = """\
 The exponent p of cost ~ n^p by least squares on logarithms, from the first to the last number of links given, and why
 it went no further. 1 is a cost that grows like the chain."""
 _ERRORS: Final = """\
 The error after the same steps of the same motion, against our own Taylor method at a tolerance of 1e-13: the start of
-the fall, before any chaos. What grows here with n is rounding and stiffness, not method."""
+the fall, before any chaos, and shorter for more links, as their steps are."""
+_MEMORY: Final = """\
+By how much a process grows, MB, while it has a chain and takes its first step. Less than a megabyte is little more than
+noise: what was left over in the process comes first."""
 
 
 def answer(results: Results) -> str:
@@ -47,10 +51,9 @@ def answer(results: Results) -> str:
         return "No engine runs any chain of this study in real time."
     seconds = number_text(float(results.options.get("duration", math.nan)), ".3g")
     leader = max(known, key=lambda name: number(known[name], "longest_n"))
-    told = [f"{name} {shown('longest_n', row['longest_n'])} ({word(row, 'method')})" for name, row in known.items()]
-    parts = [
-        f"The longest chain in real time, {seconds} s of one metre falling from the horizontal: {listed(told)} links."
-    ]
+    told = [f"{name} {_told_length(row)} ({word(row, 'method')})" for name, row in known.items()]
+    scene = listed(distinct(records(results.cases), "scene"))
+    parts = [f"The longest chain in real time, {seconds} s of {scene} in ever more links: {listed(told)} links."]
     ratios = [
         f"{times_text(number(known[leader], 'longest_n') / number(row, 'longest_n'))} {name}'s"
         for name, row in known.items()
@@ -63,6 +66,12 @@ def answer(results: Results) -> str:
     if exponents:
         parts.append(f"The cost of a step grows like n to the power of: {listed(exponents)}.")
     return " ".join(parts)
+
+
+def _told_length(row: Row) -> str:
+    """How many links; at least so many, where it was a refusal that ended the search."""
+    length = shown("longest_n", row["longest_n"])
+    return f"at least {length}" if word(row, "outcome") == "refused" else length
 
 
 def _best(rows: Sequence[Row]) -> Row | None:
@@ -110,7 +119,7 @@ def markdown_page(results: Results, plots: Sequence[Picture]) -> str:
         _ERRORS,
         _by_links(cases, "error_max", "L"),
         "## Memory",
-        "What a run takes beside what its process had before, MB; 0 where that is less than what was left over.",
+        _MEMORY,
         _by_links(cases, "memory_mb", "MB"),
         "## What stopped",
         sections.failures(cases),

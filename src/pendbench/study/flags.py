@@ -50,7 +50,7 @@ def of_row(
         yield f"too good: {good}"
     if "status" in model:
         yield f"model not compared: {model['status']}, {model['reason']}"
-    yield from _of_timing(timing)
+    yield from of_timing(timing)
 
 
 def of_priced_row(run: Mapping[str, Any], order: Mapping[str, Any], timing: Mapping[str, Any]) -> Iterator[str]:
@@ -58,10 +58,11 @@ def of_priced_row(run: Mapping[str, Any], order: Mapping[str, Any], timing: Mapp
     yield from _of_steps(order)
     if good := _too_good(run, run.get("error_max"), run.get("reference_error")):
         yield f"too good: {good}"
-    yield from _of_timing(timing)
+    yield from of_timing(timing)
 
 
-def _of_timing(timing: Mapping[str, Any]) -> Iterator[str]:
+def of_timing(timing: Mapping[str, Any]) -> Iterator[str]:
+    """The flags of a timing: that it is noisy, or that there is none."""
     if timing.get("step_spread", 0.0) > SPREAD_LIMIT:
         yield f"noisy timing: spread {timing['step_spread']:.0%}"
     if "status" in timing:

@@ -20,6 +20,7 @@ from pendbench.scene import MAX_LINKS, Scene
 from pendbench.strict import input_error
 from pendbench.study.ask import refusal, version
 from pendbench.study.case import Case
+from pendbench.study.flags import of_timing
 from pendbench.study.measure import growth_exponent
 from pendbench.study.plan import Plan, StudyFile
 from pendbench.study.results import Results
@@ -42,14 +43,15 @@ _TIMING_COLUMNS: Final = ("step_us", "step_spread", "build_s", "first_call_s")
 
 
 class Options(StudyFile):
-    """links: how many, for the cost of a step. fit_from: over this many and more, growth is fitted. step, s, and steps:
-    with which the cost and the error are measured. duration: how long a chain has to keep up with the clock, s.
-    coarsest and finest: steps of the trials, s.
+    """links: how many, for the cost of a step. fit_from: over this many and more, growth is fitted. step, s, of a chain
+    of one link: n links get an n-th of it, as their fastest swing does; steps: so many, with which the cost and the
+    error are measured. duration: how long a chain has to keep up with the clock, s. coarsest and finest: steps of the
+    trials, s.
     """
 
     links: Annotated[list[Annotated[int, Field(ge=1, le=MAX_LINKS)]], Field(min_length=1)]
     fit_from: Annotated[int, Field(ge=1)] = 100
-    step: Annotated[float, Field(gt=0, le=1)] = 1e-6
+    step: Annotated[float, Field(gt=0, le=1)] = 1e-2
     steps: Annotated[int, Field(ge=10, le=100_000)] = 100
     duration: Annotated[float, Field(gt=0, le=1000)] = 10.0
     coarsest: Annotated[float, Field(gt=0, le=1)] = 1 / 240
@@ -112,18 +114,23 @@ class _Scaling:
         first = self.racers[racer]
         return Case(self.scene(n), first.engine, first.method, None if first.dt is None else dt, first.settings)
 
+    def _step(self, n: int) -> float:
+        step: float = self.options.step / n
+        return step
+
     def _measure_cost(self, n: int) -> None:
         """The cost of a step with n links, of every racer that has got as far as this."""
         jobs = {}
         for racer, found in self.costs.items():
             if any(record["status"] != "ok" for record in found.values()):
                 continue
-            case = self._case(racer, n, self.options.step)
+            step = self._step(n)
+            case = self._case(racer, n, step)
             if (reason := refusal(case)) is not None:
                 found[n] = {"status": "refused", "reason": reason}
                 continue
-            content = (*case.content, self.options.steps, self.options.step, version(case.engine))
-            arguments = (case, self.options.step, self.options.steps)
+            content = (*case.content, self.options.steps, step, version(case.engine))
+            arguments = (case, step, self.options.steps)
             jobs[racer] = job_of(measure_step_cost, content, self.options.time_limit, *arguments)
         if jobs:
             values = self.runner.run(
@@ -145,7 +152,7 @@ class _Scaling:
         held = [trial for trial in done if trial["outcome"] == "held"]
         best = max(held, key=lambda trial: trial["n"], default=None)
         if best is None:
-            return None
+            return (last["n"] // 2, self.options.coarsest) if last["n"] > 1 else None
         failed = {trial["n"] for trial in done} - {trial["n"] for trial in held}
         least = min((n for n in failed if n > best["n"]), default=None)
         n = 2 * best["n"] if least is None else round(math.sqrt(best["n"] * least))
@@ -200,10 +207,11 @@ class _Scaling:
             "n": n,
             "engine": engine,
             "method": method,
-            "dt": math.nan if self.racers[racer].dt is None else self.options.step,
+            "dt": math.nan if self.racers[racer].dt is None else self._step(n),
             "settings": settings,
             "status": record["status"],
             "reason": record["reason"],
+            "flags": "; ".join(of_timing(record)) if record["status"] == "ok" else "",
             "horizon_s": math.nan,
             **{name: record.get(name) for name in (*_COST_COLUMNS, *_TIMING_COLUMNS)},
             "step_per_link_ns": None if step_us is None else 1e3 * step_us / n,
@@ -242,8 +250,14 @@ class _Scaling:
             "race_spent_s": best.get("spent_s", math.nan),
             "next_n": nearest.get("n", math.nan),
             "outcome": nearest.get("outcome", ""),
-            "reason": nearest.get("reason", ""),
+            "reason": nearest.get("reason", "") + self._not_tried(racer, nearest),
         }
+
+    def _not_tried(self, racer: Racer, trial: Mapping[str, Any]) -> str:
+        """That it was the study which ended the search, where it was."""
+        if self.racers[racer].dt is None or trial.get("outcome") != "lost":
+            return ""
+        return f"; no step below {self.options.finest:g} s is tried"
 
     def _trial_rows(self) -> Iterator[Record]:
         for (engine, method, settings), trials in self.trials.items():

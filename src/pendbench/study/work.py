@@ -10,11 +10,12 @@ from typing import Any, Final
 import numpy as np
 
 from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import Fault, State
+from pendbench.engines.protocol import Fault, Simulation, State
 from pendbench.engines.registry import engine
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance, wrapped
 from pendbench.physics.recursion import accelerations
+from pendbench.processes import give_memory_back
 from pendbench.recording import simulate
 from pendbench.scene import Scene
 from pendbench.study.case import Case
@@ -279,12 +280,8 @@ def measure_step_cost(case: Case, step: float, steps: int) -> Record:
 
     For a method that chooses its steps: a step of its own, over the same time.
     """
-    import psutil
-
     its, settings, until = engine(case.engine), dict(case.settings), step * steps
-    before = psutil.Process().memory_info().rss
     run = simulate(case.scene, case.engine, case.method, case.dt, [until], **settings)
-    taken = psutil.Process().memory_info().rss - before
     if run.status != "ok":
         return failed_run(Fault(run.status, run.reason))
     exact = simulate(case.scene, "analytic", "taylor", None, [until], tolerance=1e-13)
@@ -296,9 +293,23 @@ def measure_step_cost(case: Case, step: float, steps: int) -> Record:
         "reason": "",
         "error_max": float(error.max()),
         "energy_drift_max": float(np.abs(found).max()) / energy_scale(case.scene),
-        "memory_mb": max(0.0, taken / 1e6),
+        "memory_mb": _memory_taken(case, step) / 1e6,
         **_timing(timing, until),
     }
+
+
+def _memory_taken(case: Case, step: float) -> float:
+    """By how many bytes the process grows when the case is built and has taken a step (s), while it is there."""
+    import psutil
+
+    give_memory_back()
+    before = psutil.Process().memory_info().rss
+    run = engine(case.engine).build(case.scene, case.method, case.dt, **dict(case.settings))
+    if isinstance(run, Simulation):
+        run.advance(1)
+    else:
+        run.advance_to(step)
+    return max(0.0, float(psutil.Process().memory_info().rss - before))
 
 
 def measure_race(case: Case) -> Record:
