@@ -76,7 +76,8 @@ def _mapped(ours: Sequence[Row], options: Mapping[str, Any]) -> Row | None:
 
 def _cost(mapped: Row, own: Row, results: Results) -> str:
     run_s, workers = number(mapped, "run_s"), results.provenance.get("worker processes")
-    beside = f", {duration_text(run_s / workers)} if {workers} processors share them evenly" if workers and workers > 1 else ""
+    shared = f", {duration_text(run_s / workers)} if {workers} processors share them evenly" if workers else ""
+    beside = shared if workers and workers > 1 else ""
     chains, duration = number_text(number(mapped, "chains"), ",.0f"), shown("duration_s", own["duration_s"])
     return (
         f"{chains} double pendulums over {duration} s at a tolerance of {shown('tolerance', mapped['tolerance'])} take "
