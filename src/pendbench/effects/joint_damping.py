@@ -24,7 +24,7 @@ class JointDamping(NamedTuple):
     @staticmethod
     def example() -> Any:
         """Shows in half a second."""
-        return 0.2
+        return [0.3, 0.15]
 
     def is_nothing(self) -> bool:
         """Whether it does nothing."""

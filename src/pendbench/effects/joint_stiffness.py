@@ -27,7 +27,7 @@ class JointStiffness(NamedTuple):
     @staticmethod
     def example() -> Any:
         """Shows in half a second."""
-        return 2.0
+        return [2.5, 1.5]
 
     def is_nothing(self) -> bool:
         """Whether it does nothing."""

@@ -22,9 +22,9 @@ class RodMass(NamedTuple):
         return cls(each(value, n, "rod_mass", "rods"))
 
     @staticmethod
-    def example() -> float:
+    def example() -> list[float]:
         """Shows in half a second."""
-        return 0.5
+        return [0.6, 0.3]
 
     def is_nothing(self) -> bool:
         """Whether it does nothing."""

@@ -4,7 +4,7 @@ A term is a NamedTuple of floats and arrays (n,). It has:
 
 - `of(value, n)`: the term for a chain of n links, from the value in the scene; raises `InputError` if they do not fit.
 - `is_nothing()`: whether all its numbers are 0, so that it can be left out.
-- `example()`: a value as it stands in a file, for the checks that every engine goes through.
+- `example()`: a value for two links as it stands in a file, unlike for each, for the checks that every engine passes.
 
 and one or more of these laws, static methods in plain arithmetic (`+ - * /`, `np.sin`, `np.cos`, `np.sqrt`), which are
 compiled, and called with numpy arrays, and with numbers of 32 digits:
@@ -51,7 +51,7 @@ class Term(Protocol):
 
     @staticmethod
     def example() -> Any:
-        """A value that shows: it changes a chain of about 1 kg and 1 m by a tenth, rad or rad/s, in half a second."""
+        """A value that shows: it changes two links of about 1 kg and 1 m by a tenth, rad or rad/s, in half a second."""
 
     def is_nothing(self) -> bool:
         """Whether it does nothing: all its numbers are 0."""
