@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from job_functions import fail_to_price
@@ -123,17 +125,6 @@ def test_prices_are_ratios_to_the_bare_chain():
     assert found["same"]["step_price"] > 0.0
 
 
-@pytest.mark.usefixtures("others")
-def test_a_price_that_cannot_be_had_is_a_row_with_the_reason(tmp_path, monkeypatch):
-    path = tmp_path / "small.toml"
-    path.write_text(STUDY)
-    monkeypatch.setattr(effects, "measure_prices", fail_to_price)
-    run_study(path, out=tmp_path / "out", jobs=1)
-    page = (tmp_path / "out" / "report.md").read_text("utf-8").split("## What an effect costs")[1]
-    assert "no clock today" in page
-    assert "prices.png" not in page
-
-
 def test_steps_that_never_meet_the_grid_have_no_error_and_say_so(measured):
     found = measured("analytic", "rk4", 0.0123456789)
     assert "error_max" not in found
@@ -163,10 +154,26 @@ def test_a_scene_that_cannot_be_priced_is_one_line(tmp_path, priced, said):
     assert not (tmp_path / "out").exists()
 
 
-def test_the_study_runs_and_reports(tmp_path):
-    path = tmp_path / "small.toml"
-    path.write_text(STUDY)
-    rows = run_study(path, out=tmp_path / "out", jobs=1)
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A study, and its results in `out`."""
+    folder = tmp_path_factory.mktemp("effects")
+    (folder / "small.toml").write_text(STUDY)
+    run_study(folder / "small.toml", out=folder / "out", jobs=1)
+    return folder
+
+
+def test_a_price_that_cannot_be_had_is_a_row_with_the_reason(folder, tmp_path, monkeypatch):
+    shutil.copytree(folder / "out", tmp_path / "out")
+    monkeypatch.setattr(effects, "measure_prices", fail_to_price)
+    run_study(folder / "small.toml", out=tmp_path / "out", jobs=1)
+    page = (tmp_path / "out" / "report.md").read_text("utf-8").split("## What an effect costs")[1]
+    assert "no clock today" in page
+    assert "prices.png" not in page
+
+
+def test_the_study_runs_and_reports(folder):
+    rows = pd.read_csv(folder / "out" / "cases.csv")
     assert len(rows) == 16
     refused = rows[rows.status == "refused"]
     assert set(zip(refused.engine, refused.method, refused.scene, strict=True)) == {
@@ -180,12 +187,12 @@ def test_the_study_runs_and_reports(tmp_path):
     ran = rows[rows.status == "ok"]
     assert (ran.error_max < 1e-3).all()
     assert (ran.balance_error < 1e-3).all()
-    report = (tmp_path / "out" / "report.md").read_text("utf-8")
+    report = (folder / "out" / "report.md").read_text("utf-8")
     for heading in ("The answer", "How each engine simulates each effect", "Orders", "What an effect costs"):
         assert f"\n## {heading}\n" in report
     assert "4.00" in report
     assert "**" not in report.split("## Orders")[1].split("##")[0]  # no order below its claim
-    assert {plot.name for plot in (tmp_path / "out" / "plots").iterdir()} == {"balance.png", "prices.png"}
+    assert {plot.name for plot in (folder / "out" / "plots").iterdir()} == {"balance.png", "prices.png"}
 
 
 def test_the_bundled_study_holds_every_effect_alone_and_all_together():
