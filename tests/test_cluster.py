@@ -15,7 +15,7 @@ import pytest
 
 import job_functions as does
 import pendbench as pb
-from pendbench import connect
+from pendbench import connect, ensemble
 from pendbench.errors import InputError
 from pendbench.report.columns import column
 from pendbench.study import cluster as module
@@ -327,6 +327,17 @@ def test_a_worker_that_is_killed_does_not_cost_an_ensemble_anything(cluster, add
     there = pb.simulate_ensemble("double", angles, times=[0.1], cluster=address, progress=progress)
     np.testing.assert_array_equal(there.theta, pb.simulate_ensemble("double", angles, times=[0.1]).theta)
     assert told[-1] == 30_000
+
+
+def test_an_ensemble_does_not_wait_for_workers_that_never_come_back(monkeypatch):
+    monkeypatch.setattr(ensemble, "_LOOK_S", 0.2)
+    monkeypatch.setattr(ensemble, "_PATIENCE", 3)
+    with made_cluster(1) as alone:
+        angles = np.zeros((60_000, 2))
+        with pytest.raises(InputError, match="its scheduler or all of its workers are gone"):
+            pb.simulate_ensemble(
+                "double", angles, times=[0.1], cluster=alone.scheduler_address, progress=lambda *_: alone.scale(0)
+            )
 
 
 def refusal(capsys, *options: str) -> str:

@@ -97,6 +97,14 @@ def test_fast_spin_is_followed_or_given_up_and_never_endless(rate):
     np.testing.assert_allclose(short.theta[0], one.theta, rtol=0, atol=1e-8)
 
 
+def test_fixed_steps_are_taken_as_simulate_takes_them():
+    for dt, times in ((1, [1.0]), (0.1, [0.30000000000000004, 0.7]), (0.1, [0.0])):
+        many = pb.simulate_ensemble(DOUBLE, [[0.1, 0.2]], method="rk4", dt=dt, times=times)
+        one = pb.simulate(DOUBLE.with_start([0.1, 0.2], [0.0, 0.0]), method="rk4", dt=dt, times=times)
+        np.testing.assert_array_equal(many.t, one.t)
+        np.testing.assert_allclose(many.theta[:, 0], one.theta, rtol=0, atol=1e-12)
+
+
 def test_progress_is_told_and_can_cancel():
     theta, _ = starts(10_000)
     told = []
@@ -154,11 +162,14 @@ def test_flip_that_turns_back_within_a_step_is_seen():
         ({"angles": [[0.1, 0.2]], "rates": [[1.0, 2.0]] * 2}, "rates has shape (2, 2); allowed: that of angles"),
         ({"angles": [[0.1, 0.2]], "method": "gauss4"}, "unknown method 'gauss4'"),
         ({"angles": [[0.1, 0.2]], "dt": 0.1}, "dt is 0.1; allowed: none"),
-        ({"angles": [[0.1, 0.2]], "method": "rk4"}, "dt is None; allowed: a step"),
+        ({"angles": [[0.1, 0.2]], "method": "rk4"}, "dt is None; allowed: a step above 0"),
         ({"angles": [[0.1, 0.2]], "method": "rk4", "dt": 0.3, "times": [1.0]}, "whole multiples of dt = 0.3 s"),
         ({"angles": [[0.1, 0.2]], "times": [1.0, 0.5]}, "times is not in order"),
         ({"angles": [[0.1, 0.2]], "tolerance": 0.1}, "tolerance is 0.1; allowed"),
-        ({"angles": [[0.1, 0.2]], "method": "rk4", "dt": 1e-30}, "dt is 1e-30; allowed: 1e-06 or more, for 10000000"),
+        ({"angles": [[0.1, 0.2]], "method": "rk4", "dt": 1e-30}, "dt is 1e-30; allowed: 1e-08 or more, for 1e+09"),
+        ({"angles": [[0.1, 0.2]], "method": "rk4", "dt": 1e-320}, "allowed: 1e-08 or more"),
+        ({"angles": [[0.1, 0.2]], "method": "rk4", "dt": 0.01, "times": [0.01, 0.010000005]}, "whole multiples"),
+        ({"angles": [[0.1, 0.2]], "method": "rk4", "dt": 0.01, "times": [1e-9]}, "whole multiples"),
         ({"angles": [[0.1, 0.2]], "times": ["x"]}, "times is no list of numbers"),
         ({"angles": [[0.1, 10**400]]}, "angles is no table of numbers"),
         ({"angles": [[0.1, 0.2]], "progress": 5}, "progress is 5; allowed: a function"),

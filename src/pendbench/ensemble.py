@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendbench.arrays import FloatArray
-from pendbench.connect import LOCAL, connected
+from pendbench.connect import LOCAL, connected, lost
 from pendbench.errors import InputError, choose, printable
 from pendbench.processes import processors
 from pendbench.scene import ANGLE, RATE, Scene, load_scene
@@ -32,8 +32,13 @@ _VECTOR: Final = 8
 _LANES: Final = 64
 # Links of the runs that are handed out together: enough to be worth it, few enough to be told of and to be cancelled.
 _CHUNK_LINKS: Final = 1 << 13
-_MOST_STEPS: Final = 10**7
+_MOST_STEPS: Final = 10**6
 _MOST_EVER: Final = 10**15
+# Of a fixed step, which is asked for and whose work is known.
+_MOST_FIXED: Final = 10**9
+# How often a cluster is looked at, s, and how many looks in a row may find no worker.
+_LOOK_S: Final = 2.0
+_PATIENCE: Final = 60
 _SMALLEST: Final = 1e-12
 
 
@@ -74,9 +79,9 @@ def simulate_ensemble(
 
     times (k,) s, rising; the scene's duration alone where None. method: `adaptive` (dt None), with the local error
     allowed per step; or `rk4`, whose times must be whole multiples of its step dt, s. A trajectory that needs more than
-    `most_steps` ends with the status `work limit`; `rk4` is refused at once. threads: one for each processor
-    where None. cluster: the address of a Dask cluster to run on instead, or `local` for one with as many processes.
-    progress(done, K) is called as trajectories are done; whatever it raises cancels the rest.
+    `most_steps` ends with the status `work limit`. threads: one for each processor where None. cluster: the address of
+    a Dask cluster to run on instead, or `local` for one with as many processes. progress(done, K) is called as
+    trajectories are done; whatever it raises cancels the rest.
 
     Results are those of `simulate` from each start, but for rounding. The starts and the states asked for, and a word
     for each, are all that grows with K: (16 (k + 1) n + 64) K bytes, and 32 n K before the first run, where that is
@@ -95,6 +100,8 @@ def simulate_ensemble(
         states[:, low:high], status[low:high] = out, how
         if progress is not None:
             progress(high, runs)
+    if method == "rk4":
+        asked = np.asarray(_step_counts(asked, _step(dt)) * _step(dt), dtype=np.float64)
     return Ensemble(asked, states[..., :n], states[..., n:], status)
 
 
@@ -130,24 +137,24 @@ def first_flips(
 
 
 @contextmanager
-def _pool(threads: int | None, cluster: str | None) -> Iterator[tuple[Executor, int]]:
-    """Where chunks run, and how many at once."""
+def _pool(threads: int | None, cluster: str | None) -> Iterator[tuple[Executor, int, Callable[[], bool]]]:
+    """Where chunks run, how many at once, and whether there is anyone to run them."""
     workers = _workers(threads)
     if cluster is None:
         with ThreadPoolExecutor(workers) as pool:
-            yield pool, workers
+            yield pool, workers, lambda: True
         return
     if threads is not None and cluster != LOCAL:
         raise InputError(f"threads is {threads}; allowed: none, since a cluster has the workers that it has")
     with connected(cluster, workers) as client, client.get_executor(pure=False) as pool:
-        yield pool, sum(client.nthreads().values())
+        yield pool, sum(client.nthreads().values()), lambda: bool(client.nthreads())
 
 
 def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None, cluster: str | None) -> Iterator[Any]:
     """The results of chunks of the starts, in order; a generator that is closed cancels those that have not begun."""
     make()  # what cannot be used is refused before anything runs
     waiting: list[tuple[int, int, Any]] = []
-    with _pool(threads, cluster) as (pool, workers):
+    with _pool(threads, cluster) as (pool, workers, alive):
         size = _chunk(len(starts), starts.shape[1], workers)
         bounds = ((low, min(low + size, len(starts))) for low in range(0, len(starts), size))
         try:
@@ -157,10 +164,21 @@ def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None,
                 if not waiting:
                     return
                 low, high, future = waiting.pop(0)
-                yield low, high, *future.result()
+                yield low, high, *_result(future, alive, cluster)
         finally:
             for _, _, future in waiting:
                 future.cancel()
+
+
+def _result(future: Any, alive: Callable[[], bool], cluster: str | None) -> Any:
+    """What a chunk gave. Raises InputError where there has been nobody to run it for long."""
+    misses = 0
+    while misses <= _PATIENCE:
+        try:
+            return future.result(timeout=_LOOK_S)
+        except TimeoutError:
+            misses = 0 if alive() else misses + 1
+    raise InputError(lost(str(cluster)))
 
 
 def _chunk(runs: int, d: int, workers: int) -> int:
@@ -205,7 +223,7 @@ def _runner(
     if type(most_steps) is not int or not 1 <= most_steps <= _MOST_EVER:
         raise InputError(f"most_steps is {show(most_steps)}; allowed: a whole number from 1 to {_MOST_EVER:g}")
     if method == "rk4":
-        return _fixed_runner(scene, dt, times, most_steps)
+        return _fixed_runner(scene, dt, times)
     if dt is not None:
         raise InputError(f"dt is {show(dt)}; allowed: none, since method 'adaptive' chooses its steps")
     from pendbench.physics.many import many_system_of  # compiles or loads the kernels
@@ -228,27 +246,40 @@ def _runner(
     return run
 
 
-def _fixed_runner(scene: Scene, dt: float | None, times: FloatArray, most_steps: int) -> Run:
+def _fixed_runner(scene: Scene, dt: float | None, times: FloatArray) -> Run:
     from pendbench.physics.many import many_system_of
     from pendbench.solvers.many import runge_kutta_many
     from pendbench.solvers.tableaux import RK4
 
-    if not isinstance(dt, float) or not 0.0 < dt <= float(times[-1]):
-        raise InputError(f"dt is {show(dt)}; allowed: a step, s, of at most {times[-1]:g}")
-    if times[-1] / dt > most_steps:
-        raise InputError(f"dt is {dt:g}; allowed: {times[-1] / most_steps:g} or more, for {most_steps} steps at most")
-    counts = np.rint(times / dt)
-    if np.abs(times / dt - counts).max() > 1e-6:
-        raise InputError(f"times: allowed: whole multiples of dt = {dt:g} s")
+    step = _step(dt)
+    counts = _step_counts(times, step)
 
     def run(starts: FloatArray) -> tuple[Any, Any]:
         out = np.empty((len(times), len(starts), 2 * scene.n))
         lanes = _lanes(len(starts))
-        runge_kutta_many(many_system_of(scene, lanes), RK4, starts, counts.astype(np.int64), dt, lanes, out)
+        runge_kutta_many(many_system_of(scene, lanes), RK4, starts, counts, step, lanes, out)
         whole = np.isfinite(out).all(axis=(0, 2))
         return out, np.where(whole, "ok", "not finite")
 
     return run
+
+
+def _step(dt: object) -> float:
+    if isinstance(dt, bool) or not isinstance(dt, int | float) or not 0.0 < dt < math.inf:
+        raise InputError(f"dt is {show(dt)}; allowed: a step above 0, s")
+    return float(dt)
+
+
+def _step_counts(times: FloatArray, dt: float) -> npt.NDArray[np.int64]:
+    """After how many steps each of the times comes."""
+    if times[-1] > _MOST_FIXED * dt:
+        raise InputError(
+            f"dt is {dt:g}; allowed: {times[-1] / _MOST_FIXED:g} or more, for {_MOST_FIXED:g} steps at most"
+        )
+    counts = np.rint(times / dt)
+    if np.abs(times / dt - counts).max() > 1e-6 or np.any(np.diff(counts) <= 0) or np.any((counts == 0) & (times > 0)):
+        raise InputError(f"times: allowed: whole multiples of dt = {dt:g} s")
+    return counts.astype(np.int64)
 
 
 def _words(outcomes: Any) -> npt.NDArray[np.str_]:

@@ -25,8 +25,10 @@ SUMMARY: Final = ("engine", "method", "n", "status", "step_us", "step_per_link_n
 _LONGEST: Final = """\
 A chain counts where its run, with the step that is given, takes no longer than the motion itself, on one core, and its
 energy stays within 1 % of its scale (and its rods within 1 % of their lengths) to the end. "Next": what became of the
-shortest chain beyond it. The length is known to a tenth; the step is one of a ladder, each a third shorter than the one
-before, begun a little coarser than the step of the chain before suggests."""
+shortest chain beyond it. The lengths that were tried are a tenth apart; the step is one of a ladder, each a third
+shorter than the one before, begun a little coarser than the step of the chain before suggests, and refined while energy
+is lost: no coarser one is tried where the first is too slow. A method that chooses its steps has the one tolerance that
+the study gives it. As many trials run side by side as there are workers."""
 _COST: Final = """\
 The median cost of one step, of a chain that starts to fall. A chain of n links gets an n-th of the step of one link, as
 its fastest swing does. A method that chooses its steps is shown with its own, whose length is its own affair. An
@@ -69,9 +71,10 @@ def answer(results: Results) -> str:
 
 
 def _told_length(row: Row) -> str:
-    """How many links; at least so many, where it was a refusal that ended the search."""
+    """How many links; at least so many, where a refusal or the finest step that is tried ended the search."""
     length = shown("longest_n", row["longest_n"])
-    return f"at least {length}" if word(row, "outcome") == "refused" else length
+    bounded = word(row, "outcome") == "refused" or "no step below" in word(row, "reason")
+    return f"at least {length}" if bounded else length
 
 
 def _best(rows: Sequence[Row]) -> Row | None:

@@ -136,8 +136,8 @@ def integrate_many(
     outcomes (K,), integers: how each run ended; one that gave up leaves nan where it has no states. stopped (K,): the
     time it reached, s. A run that passes `limit` in one of the first d / 2 components of its state is over: its outcome
     is CROSSED, and stopped the time of the crossing, from the cubic through the states at both ends of the step, which
-    is also what says that a run passed the limit and came back within one step. The
-    other arguments are those of `adaptive.integrate`; method must be of order 8. The system has room for `lanes`.
+    is also what says that a run passed the limit and came back within one step. The other arguments are those of
+    `adaptive.integrate`; method must be of order 8. The system has room for `lanes`.
     """
     d, stages = starts.shape[1], len(method.b)
     y, inner, slopes = np.zeros((d, lanes)), np.zeros((d, lanes)), np.zeros((stages, d, lanes))
@@ -231,10 +231,10 @@ def _look_for_crossing(b: int, before: FloatArray, lanes: _Lanes, limit: float, 
 
 @compiled_for_threads
 def _first_crossing(q0: float, v0: float, q1: float, v1: float, limit: float) -> float:
-    """Where, from 0 to 1, the cubic with values q and slopes v at its ends first passes +-limit; inf where nowhere.
+    """Where, from 0 to 1, the cubic with values q and slopes v at its ends passes +-limit; inf where it does not.
 
-    q0 is within the limit. Where q1 is too, the cubic may turn back beyond it, once: it then has its largest value
-    where its slope, of one sign before and of the other after, is 0.
+    q0 is within the limit. Where q1 is too, the cubic may turn back beyond it: where its slope, of one sign before and
+    of the other after, is 0. A cubic that turns twice within the step is not followed: steps are too short for that.
     """
     turn = 1.0
     if abs(q1) <= limit:

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation, State
+from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Simulation, State
 from pendbench.scene import Scene
 
 T = TypeVar("T")
@@ -139,12 +139,13 @@ def time_each_step(
 class Race(NamedTuple):
     """How far a run came against the clock: simulated time reached and time spent stepping, s, and whether it was lost.
 
-    lost: the state at some sample was one that `is_lost` knew, or the engine said that something was wrong.
+    lost: the state at some sample was one that `is_lost` knew, or the engine said that something was wrong: fault.
     """
 
     reached: float
     spent: float
     lost: bool
+    fault: Fault | None = None
 
 
 def race(
@@ -170,8 +171,9 @@ def race(
             simulation.advance_to(mark * unit)
         spent += time.perf_counter() - begun
         reached = mark * unit
-        if simulation.health() is not None or is_lost(simulation.state()):
-            return Race(reached, spent, lost=True)
+        fault = simulation.health()
+        if fault is not None or is_lost(simulation.state()):
+            return Race(reached, spent, lost=True, fault=fault)
         if spent > scene.duration:
             break
     return Race(reached, spent, lost=False)

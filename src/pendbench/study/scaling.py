@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pendbench.physics.energy import energy_scale
 from pendbench.scene import MAX_LINKS, Scene
 from pendbench.strict import input_error
 from pendbench.study.ask import refusal, version
@@ -67,6 +68,8 @@ def check(plan: Plan) -> None:
         values = getattr(scene, name)
         if np.ptp(values) > 1e-12 * np.abs(values).max(initial=1.0):
             raise input_error(plan.where, f"scene {scene.name!r}: {name} differ; allowed: links that are alike")
+    if not energy_scale(scene):
+        raise input_error(plan.where, f"scene {scene.name!r} is at rest and free of gravity; allowed: one that moves")
 
 
 def run(plan: Plan, runner: Runner) -> Results:
@@ -229,7 +232,7 @@ class _Scaling:
             "method": racer[1],
             "settings": racer[2],
             "n_from": fitted[0] if fitted else math.nan,
-            "n_to": max(measured, default=math.nan),
+            "n_to": fitted[-1] if fitted else math.nan,
             "step_exponent": growth_exponent(np.array(fitted, dtype=float), costs),
             "status": stopped[0]["status"] if stopped else "ok",
             "reason": stopped[0]["reason"] if stopped else "",
