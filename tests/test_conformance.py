@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -208,6 +210,18 @@ class Forgetful(AnalyticEngine):
         return super().build(scene.without("drive_torque"), method, dt, **settings)
 
 
+class Reversed(Forgetful):
+    """Takes the list of an effect from its other end."""
+
+    methods = {"rk4": AnalyticEngine.methods["rk4"]}
+
+    def build(self, scene, method, dt, **settings):
+        effects = scene.effects
+        if effects.rod_mass is not None:
+            effects = dataclasses.replace(effects, rod_mass=effects.rod_mass[::-1])
+        return AnalyticEngine.build(self, dataclasses.replace(scene, effects=effects), method, dt, **settings)
+
+
 class Windy(Forgetful):
     """Names an effect that there is not."""
 
@@ -215,6 +229,10 @@ class Windy(Forgetful):
 
 
 BROKEN = {
+    "reverses a list": (
+        Reversed,
+        "simulates the effects it maps: rod_mass: what it changes",
+    ),
     "claims a lower order": (lambda: wrapping(Passing, order=2), "converges: its order is 3.99, and it claims 2"),
     "claims a higher order": (lambda: wrapping(Passing, order=5), "converges: its order is 3.99, and it claims 5"),
     "drops half a step": (half_a_step_behind, "converges: its order is 1.0"),

@@ -356,6 +356,15 @@ def test_heyoka_knows_gravity_alone() -> None:
     assert refusal(its, "taylor", three()) is None
 
 
+def test_what_acts_on_a_scene_cannot_be_changed_behind_its_back() -> None:
+    scene = two(joint_damping=0.3, drive_torque=MOTOR)
+    with pytest.raises(TypeError):
+        scene.terms["joint_damping"] = None  # type: ignore[index]
+    for name, field in (("joint_damping", "damping"), ("drive_torque", "amplitudes")):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(scene.terms[name], field)[0] = 5.0
+
+
 def test_a_reference_that_would_take_for_ever_is_refused_at_once() -> None:
     scene = chain(MOST_WITH_EFFECTS + 1)
     assert "201 links and more than gravity; allowed for the reference: at most 200" in complaint(

@@ -169,6 +169,7 @@ def test_a_price_that_cannot_be_had_is_a_row_with_the_reason(folder, tmp_path, m
     run_study(folder / "small.toml", out=tmp_path / "out", jobs=1)
     page = (tmp_path / "out" / "report.md").read_text("utf-8").split("## What an effect costs")[1]
     assert "no clock today" in page
+    assert "refused" in page  # of rattle, in the same table
     assert "prices.png" not in page
 
 

@@ -41,12 +41,49 @@ class CubicSpring(NamedTuple):
     def joint_potential(term, i, bend):
         return 0.25 * term.stiffness[i] * bend * bend * bend * bend
 """
-IMPORT = "from pendbench.effects.cubic_spring import CUBIC_SPRING, CubicSpring"
-LINE = "    cubic_spring: Annotated[Each, CUBIC_SPRING, CubicSpring] | None = None"
+# Of the other kind: no force, but an acceleration that does not change.
+TILT = """
+from typing import Any, Final, NamedTuple
+
+from pendbench.ranges import Range
+
+TILT: Final = Range(-1e50, 1e50, "m/s^2")
+
+class Tilt(NamedTuple):
+    sideways: float
+
+    @classmethod
+    def of(cls, value, n):
+        return cls(value)
+
+    @staticmethod
+    def example():
+        return 2.0
+
+    def is_nothing(self):
+        return self.sideways == 0.0
+
+    @staticmethod
+    def pivot_acceleration(term, t):
+        return term.sideways, 0.0
+
+    @staticmethod
+    def mass_potential(term, x, y):
+        return term.sideways * x
+"""
+IMPORT = """
+from pendbench.effects.cubic_spring import CUBIC_SPRING, CubicSpring
+from pendbench.effects.tilt import TILT, Tilt
+"""
+LINE = """
+    cubic_spring: Annotated[Each, CUBIC_SPRING, CubicSpring] | None = None
+    tilt: Annotated[float, TILT, Tilt] | None = None
+"""
 IMPORTED = "from pendbench.effects.driven_pivot import"
 LISTED = "    gravity: Annotated"
-METHODS = {"analytic": "rk4", "mujoco": "rk4", "pinocchio": "rk4"}
-# What these make of it, and that an adapter without its line refuses it.
+# The first method of each, by which the kit looks at each effect alone.
+METHODS = {"analytic": "adaptive", "mujoco": "euler", "pinocchio": "rk4", "pymunk": "default"}
+# What these make of both, and that an adapter without their lines refuses them.
 USED = """
 import sys
 
@@ -54,13 +91,17 @@ import numpy as np
 from pendbench.engines.conformance import _simulates_the_effects_it_maps as check
 from pendbench.engines.protocol import refusal
 from pendbench.engines.registry import engine
+from pendbench.errors import MissingEngineError
 from pendbench.physics import dense, recursion
 from pendbench.scene import load_scene
 
 scene = load_scene("scene.toml")
 args = scene.angles, scene.rates, 0.3
 np.testing.assert_allclose(recursion.accelerations(scene, *args), dense.accelerations(scene, *args), rtol=1e-12)
-assert refusal(engine("pymunk"), "tuned", scene) == "the adapter has no cubic_spring"
+try:
+    assert "cubic_spring" in refusal(engine("heyoka"), "taylor", scene)
+except MissingEngineError:
+    pass
 given = sys.argv[1:]
 for name, method in zip(given[: len(given) // 2], given[len(given) // 2 :]):
     assert refusal(engine(name), method, scene) is None, name
@@ -70,7 +111,7 @@ SCENE = """
 duration = 1
 chain = {masses = [1.0, 0.5], lengths = [1.0, 0.7]}
 start = {angles = [0.3, 0.9]}
-effects = {gravity = 9.81, cubic_spring = [1.0, 2.0]}
+effects = {gravity = 9.81, cubic_spring = [1.0, 2.0], tilt = 3.0}
 """
 
 
@@ -78,13 +119,14 @@ def test_an_effect_of_ones_own_needs_its_file_its_line_and_a_line_in_each_adapte
     package = tmp_path / "pendbench"
     shutil.copytree(Path(pendbench.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     (package / "effects/cubic_spring.py").write_text(CUBIC_SPRING)
+    (package / "effects/tilt.py").write_text(TILT)
     page = (package / "effects/__init__.py").read_text()
     page = page.replace(IMPORTED, f"{IMPORT}\n{IMPORTED}", 1).replace(LISTED, f"{LINE}\n{LISTED}", 1)
     (package / "effects/__init__.py").write_text(page)
     able = {name: method for name, method in METHODS.items() if name != "pinocchio" or _there("pinocchio")}
     for name in able:
         adapter = package / "engines" / f"{name}.py"
-        line = '"cubic_spring": Mapped("as it is"), '
+        line = '"cubic_spring": Mapped("as it is"), "tilt": Mapped("as gravity"), '
         adapter.write_text(adapter.read_text().replace("_EFFECTS: Final = {", f"_EFFECTS: Final = {{{line}", 1))
     (tmp_path / "scene.toml").write_text(SCENE)
     settings = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

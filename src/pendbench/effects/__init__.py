@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, ClassVar, get_args, get_type_hints
 
+import numpy as np
+
 from pendbench.effects.air_drag import AIR_DRAG, AirDrag, AirDragValue
 from pendbench.effects.drive_torque import DRIVE_TORQUE, DriveTorque, DriveTorqueValue
 from pendbench.effects.driven_pivot import DRIVEN_PIVOT, DrivenPivot, DrivenPivotValue
@@ -64,11 +66,14 @@ class Effects:
         return tuple(field.name for field in dataclasses.fields(self) if getattr(self, field.name) is not None)
 
     def terms(self, n: int) -> dict[str, Term]:
-        """What acts on a chain of n links, by name: the effects named but for those whose numbers are all 0.
+        """What acts on a chain of n links, by name: the effects named but for those whose numbers are all 0. Read-only.
 
         Raises `InputError` where an effect does not fit a chain of n links.
         """
         terms = {name: _kinds()[name][1].of(getattr(self, name), n) for name in self.named()}
+        for number in (number for term in terms.values() for number in term):
+            if isinstance(number, np.ndarray):
+                number.setflags(write=False)
         return {name: term for name, term in terms.items() if not term.is_nothing()}
 
 

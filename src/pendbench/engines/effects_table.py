@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from pendbench.effects import names
-from pendbench.engines.protocol import Engine, Mapped
+from pendbench.engines.protocol import Engine, Mapped, mapped_effects
 from pendbench.engines.registry import engine
 
 #: The engines of the table.
@@ -25,7 +25,7 @@ def effects_table() -> str:
 
 
 def _row(effect: str, its: Engine) -> str:
-    mapped = getattr(its, "effects", {}).get(effect, Mapped("not known to the adapter", refused=True))
+    mapped = mapped_effects(its).get(effect, Mapped("not known to the adapter", refused=True))
     told = f"refused: {mapped.how}" if mapped.refused else mapped.how
     return f"| `{effect}` | {its.name} | {told} | {'-' if mapped.refused else _orders(effect, its, mapped)} |"
 

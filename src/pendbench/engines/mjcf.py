@@ -35,7 +35,7 @@ _AXIS: Final = (0.0, -1.0, 0.0)
 _DISABLED: Final = ("constraint", "contact", "spring", "damper", "actuation", "sensor", "autoreset", "gravity")
 #: The effects that a model holds, and what each needs of these. The others want forces computed while it runs.
 HELD: Final[Mapping[str, tuple[str, ...]]] = {
-    "gravity": ("gravity",),
+    "gravity": (),
     "joint_damping": ("damper",),
     "joint_stiffness": ("spring",),
     "rod_mass": (),
@@ -92,7 +92,7 @@ def chain_spec(scene: Scene) -> mujoco.MjSpec:
     """
     spec = mujoco.MjSpec()
     spec.modelname = printable(scene.name)
-    spec.option.gravity = (0.0, 0.0, -(scene.effects.gravity or 0.0))
+    spec.option.gravity = _weight(scene)
     spec.memory = _MEMORY[0] + _MEMORY[1] * scene.n**2
     spec.option.disableflags = sum(int(_flag(name)) for name in _disabled(scene))
     body, hangs_at = spec.worldbody, 0.0
@@ -155,9 +155,15 @@ def fits_file(scene: Scene) -> bool:
     return scene.n <= DEEPEST_FILE and scene.terms.keys() <= HELD.keys()
 
 
+def _weight(scene: Scene) -> tuple[float, float, float]:
+    """What a mass weighs at the start in the pivot's frame, over that mass."""
+    x, y = acting.pivot_acceleration(scene, 0.0).tolist()
+    return 0.0 - x, 0.0, 0.0 - y
+
+
 def _add_options(root: ET.Element, scene: Scene) -> None:
     ET.SubElement(root, "compiler", angle="radian")
-    gravity = _text((0.0, 0.0, -(scene.effects.gravity or 0.0)))
+    gravity = _text(_weight(scene))
     option = ET.SubElement(root, "option", timestep=_text([_FILE_DT]), integrator="RK4", gravity=gravity)
     ET.SubElement(option, "flag", dict.fromkeys(_disabled(scene), "disable"))
     rods = ET.SubElement(ET.SubElement(root, "default"), "geom")
@@ -225,7 +231,7 @@ def _each(scene: Scene, effect: str) -> FloatArray:
 def _disabled(scene: Scene) -> tuple[str, ...]:
     """What the scene does not call for, by the names that MJCF has for it."""
     needs = {flag for name in scene.terms for flag in HELD.get(name, _ASKS)}
-    if acting.is_shaken(scene):
+    if acting.is_pulled(scene):
         needs.add("gravity")
     return tuple(flag for flag in _DISABLED if flag not in needs)
 

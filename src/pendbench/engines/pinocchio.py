@@ -54,7 +54,7 @@ def joint_values(absolute: FloatArray) -> FloatArray:
 def chain_model(scene: Scene) -> Any:
     """The chain in Pinocchio: x points down, and each rod lies along the x axis of its joint's frame."""
     model = pin.Model()
-    model.gravity = pin.Motion(np.array([scene.effects.gravity or 0.0, 0.0, 0.0]), np.zeros(3))
+    model.gravity = _weight(scene, 0.0)
     joint, end, rods = 0, np.zeros(3), acting.rods(scene)
     for i in range(scene.n):
         joint = model.addJoint(joint, pin.JointModelRZ(), pin.SE3(np.eye(3), end), f"joint {i}")
@@ -69,6 +69,12 @@ def _inertia(mass: float, rod: float, end: FloatArray) -> Any:
     both = mass + rod
     middle = rod / 12.0 + mass * rod / (4.0 * both)
     return pin.Inertia(both, end * ((mass + 0.5 * rod) / both), np.diag([0.0, 1.0, 1.0]) * middle * (end @ end))
+
+
+def _weight(scene: Scene, t: float) -> Any:
+    """What a mass weighs at t s in the pivot's frame, over that mass: x points down here, and y to the right."""
+    x, y = acting.pivot_acceleration(scene, t)
+    return pin.Motion(np.array([y, -x, 0.0]), np.zeros(3))
 
 
 class _Run:
@@ -92,8 +98,7 @@ class _Run:
 
     def _accelerations(self, t: float, q: FloatArray, v: FloatArray) -> FloatArray:
         if self._shaken:
-            x, y = acting.pivot_acceleration(self._scene, t)
-            self._model.gravity = pin.Motion(np.array([y, -x, 0.0]), np.zeros(3))
+            self._model.gravity = _weight(self._scene, t)
         torques = self._torques(t, q, v) if self._pushed else self._no_torques
         found: FloatArray = pin.aba(self._model, self._data, q, v, torques)
         return found

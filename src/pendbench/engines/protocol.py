@@ -121,12 +121,18 @@ class Engine(Protocol):
         """A run at time 0 in the scene's start. Never timed. `settings` holds only settings the method declares."""
 
 
-_GRAVITY_ALONE: Final = {"gravity": Mapped("not said")}
+_GRAVITY_ALONE: Final = {"gravity": Mapped("its adapter does not say")}
+
+
+def mapped_effects(engine: Engine) -> Mapping[str, Mapped]:
+    """What the engine does with each effect that its adapter knows."""
+    known: Mapping[str, Mapped] = getattr(engine, "effects", _GRAVITY_ALONE)
+    return known
 
 
 def refusal(engine: Engine, method: str, scene: Scene) -> str | None:
     """Why the engine cannot simulate the scene with that method, or None."""
-    mapped: Mapping[str, Mapped] = getattr(engine, "effects", _GRAVITY_ALONE)
+    mapped = mapped_effects(engine)
     known = engine.methods[method].effects
     for name in scene.terms:
         if name not in mapped:

@@ -77,8 +77,8 @@ class _Run:
         self._ahead = 0.5 * dt if tuned else 0.0
         self._space = pymunk.Space()
         self._space.iterations = iterations
-        if scene.effects.gravity is not None:
-            self._space.gravity = (0.0, -scene.effects.gravity)
+        x, y = acting.pivot_acceleration(scene, 0.0).tolist()
+        self._space.gravity = (-x, -y)
         self._forces = None if acting.is_plain(scene) else Forces(scene, self._space, dt, tuned)
         self._hang(scene, tuned)
         self._buffer = batch.Buffer()

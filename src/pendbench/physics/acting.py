@@ -137,6 +137,11 @@ def mass_potential(scene: Scene, places: FloatArray) -> FloatArray:
     return np.asarray(np.sum(lumped_masses(scene) * total, axis=-1))
 
 
+def is_pulled(scene: Scene) -> bool:
+    """Whether the pivot accelerates against free fall: under gravity, for one."""
+    return bool(_with(scene, "pivot_acceleration"))
+
+
 def is_shaken(scene: Scene) -> bool:
     """Whether the pivot's acceleration changes with time: a constant one has a potential."""
     return any(not hasattr(term, "mass_potential") for term in _with(scene, "pivot_acceleration"))

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pendbench.arrays import FloatArray
-from pendbench.effects.term import Term
 from pendbench.physics import acting
 from pendbench.scene import Scene
 
@@ -59,7 +58,7 @@ class RodSystem(NamedTuple):
 
 def system_of(scene: Scene) -> System | RodSystem:
     """The scene's chain and effects, ready for the kernels."""
-    terms = [term for name, term in scene.terms.items() if name != "gravity"]
+    terms: list[Any] = [term for name, term in scene.terms.items() if name != "gravity"]
     frames, joints, drags = (_with(terms, law) for law in ("pivot_acceleration", "joint_torque", "drag"))
     effects: dict[str, Any] = {
         "gravity": scene.effects.gravity or 0.0,
@@ -89,5 +88,10 @@ def system_of(scene: Scene) -> System | RodSystem:
     )
 
 
-def _with(terms: list[Term], law: str) -> tuple[Term, ...]:
-    return tuple(term for term in terms if hasattr(term, law))
+def _with(terms: list[Any], law: str) -> tuple[Any, ...]:
+    """The terms with this law, whose arrays are copied: kernels are compiled for arrays that can be written."""
+    return tuple(type(term)(*map(_own, term)) for term in terms if hasattr(term, law))
+
+
+def _own(number: Any) -> Any:
+    return np.array(number) if isinstance(number, np.ndarray) else number

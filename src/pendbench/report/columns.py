@@ -244,8 +244,8 @@ _STABILITY: Final = {
     "stable_dt_exponent": Column(
         "1", ".2f", "exponent", "p in: largest stable step ~ n^p, by least squares over scenes that differ in n alone"
     ),
-    "n_from": Column("1", "d", "from n", "the fewest links of these scenes whose largest stable step is known"),
-    "n_to": Column("1", "d", "to n", "the most links of these scenes whose largest stable step is known"),
+    "n_from": Column("1", "d", "from n", "the fewest links that the exponent is fitted to"),
+    "n_to": Column("1", "d", "to n", "the most links that the exponent is fitted to"),
     "scenes_held": Column("1", "d", "scenes held", "of these scenes, those that some step holds"),
     "scenes": Column("1", "d", "scenes", "how many scenes these are"),
     "adaptive": _text("adaptive", "whether the method chooses its own steps"),
@@ -294,7 +294,7 @@ _SCALING: Final = {
     "step_per_link_ns": Column("ns", ".3g", "step per link, ns", "the cost of a step over n", is_time=True),
     "step_exponent": Column("1", ".2f", "exponent", "p in: cost of a step ~ n^p", is_time=True),
     "memory_mb": Column(
-        "MB", ".3g", "memory, MB", "what building and running took beside what the process had", is_time=True
+        "MB", ".3g", "memory, MB", "by how much the process grew while it had the chain and took a step", is_time=True
     ),
     "longest_n": Column(
         "1", "d", "longest chain", "the most links that run in real time with an energy error below 1 %", is_time=True

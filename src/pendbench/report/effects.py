@@ -14,7 +14,7 @@ from pendbench.report.columns import number_text, shown, times_text
 from pendbench.report.effects_plots import balance_figure, price_figure
 from pendbench.report.look import Look
 from pendbench.report.plots import Picture, draw
-from pendbench.report.rows import Row, distinct, is_ok, number, of, records, word
+from pendbench.report.rows import Row, case_name, distinct, is_ok, number, of, records, word
 from pendbench.report.stability_map import pair_name, pairs
 from pendbench.report.text import counted, listed, markdown, table
 from pendbench.study.results import Results
@@ -31,7 +31,8 @@ _ERRORS: Final = """\
 The largest distance of any mass from where it should be, over the chain's length, up to the reference's horizon, at the
 finest step of each method; and the energy's balance: its change less the work of damping, drag and drives, integrated
 along the same run. A balance near its floor is as good as can be told. The error is against the truth; the balance
-needs none, so the two check each other."""
+needs none, so the two check each other. A method of order 1 takes angles and rates that belong half a step apart: where
+a pivot shakes fast its balance is large, and falls with the step."""
 _ORDERS: Final = """\
 The order with which the error falls as the step does, and the order that the method claims. Quadratic drag is not
 smooth where a mass stands still (its force turns about within no time), and methods of high order lose some of theirs
@@ -44,9 +45,9 @@ _FLAGS: Final = """\
 What leaving things on that the scene does not call for would cost: MuJoCo with the flags it has by itself (contacts,
 constraints, springs, dampers, actuation, sensors) against the same chain with these turned off."""
 _UPRIGHT: Final = """\
-A pendulum upside down stays there if its pivot shakes fast enough (amplitude times frequency above the root of 2 g l),
-and falls if it does not: an effect that is approximated silently shows as a pendulum that does the wrong one. "Moved
-by" is the farthest from where it started; the truth's is in the table of scenes."""
+Upside down it stays there if its pivot shakes up and down fast enough (amplitude times frequency above the root of
+2 g l), and falls if it does not: an effect that is approximated silently shows as a pendulum that does the wrong one.
+"Moved by" is the farthest from where it started; the truth's is in the table of scenes."""
 
 
 def answer(results: Results) -> str:
@@ -54,7 +55,9 @@ def answer(results: Results) -> str:
     cases, prices = records(results.cases), records(results.tables.get("prices"))
     parts = []
     for name in distinct(cases, "engine"):
-        fine = [row for row in _finest(of(cases, engine=name)) if is_ok(row)]
+        fine = [
+            row for row in _finest(of(cases, engine=name)) if is_ok(row) and math.isfinite(number(row, "error_max"))
+        ]
         best = _best_method(fine)
         if best:
             worst = max(number(row, "error_max") for row in best)
@@ -115,9 +118,7 @@ def pictures(results: Results) -> Iterator[Picture]:
     measured = [row for row in cases if number(row, "balance_error") > 0 and number(row, "error_max") > 0]
     if measured:
         caption = "The energy's balance against the error, each mark a scene and a step. An effect that were simulated "
-        caption += (
-            "with a wrong law would keep its error as steps shrink; a lost balance would lie high above the rest."
-        )
+        caption += "with a wrong law would keep both as steps shrink."
         yield Picture("balance", "", caption, draw(partial(balance_figure, Look.of_cases(measured), measured)))
 
 
@@ -145,6 +146,7 @@ def markdown_page(results: Results, plots: Sequence[Picture]) -> str:
             _finest([row for row in cases if is_ok(row)]),
             ("scene", "engine", "method", "dt", "error_max", "balance_error", "balance_floor"),
         ),
+        *_untaken(cases),
         "## Orders",
         _ORDERS,
         _by_scene(orders),
@@ -164,6 +166,13 @@ def markdown_page(results: Results, plots: Sequence[Picture]) -> str:
         sections.files(results),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _untaken(cases: Sequence[Row]) -> Iterator[str]:
+    """Why some runs that ended well have no error."""
+    for row in cases:
+        if is_ok(row) and word(row, "reason"):
+            yield f"- {markdown(case_name(row))}: {markdown(word(row, 'reason'), 200)}"
 
 
 def _by_scene(orders: Sequence[Row]) -> str:
@@ -201,6 +210,8 @@ def _by_effect(prices: Sequence[Row]) -> str:
 def _price(row: Row | None) -> str:
     if row is None:
         return ""
+    if word(row, "status") == "refused":
+        return "refused"
     if not is_ok(row):
         return sections.status_text(row, 80)
     return f"{sections.cell(row, 'step_price')} ({sections.cell(row, 'step_us')} µs)"
@@ -235,6 +246,6 @@ def _prices(prices: Sequence[Row], name: str) -> list[float]:
 def _upright(cases: Sequence[Row], scenes: set[str]) -> Iterator[str]:
     rows = [row for row in _finest([row for row in cases if is_ok(row)]) if word(row, "scene") in scenes]
     if rows:
-        yield "## Does it stay up?"
+        yield "## A single link on a driven pivot"
         yield _UPRIGHT
         yield sections.rows_table(rows, ("scene", "engine", "method", "dt", "moved_max_rad"))

@@ -106,7 +106,12 @@ def timing_trust(cases: Sequence[Row]) -> str:
         f"{counted(len(noisy), 'of them is', 'of them are')} noisy: the machine did something else in between. Trust "
         "these costs to the spread given and no further; for better ones run it again, `--fresh`, on an idle machine:"
     )
-    names = [f"- {markdown(case_name(row))}: spread {cell(row, 'step_spread')}" for row in noisy[:_LISTED]]
+    chains = {(word(row, "scene"), number(row, "n")) for row in timed}
+    several = len(chains) > len({scene for scene, _ in chains})
+    names = []
+    for row in noisy[:_LISTED]:
+        links = f", {cell(row, 'n')} links" if several else ""
+        names.append(f"- {markdown(case_name(row))}{links}: spread {cell(row, 'step_spread')}")
     if len(noisy) > _LISTED:
         names.append(f"- and {len(noisy) - _LISTED} more, flagged in the tables")
     return "\n\n".join([*parts, "\n".join(names)])

@@ -49,7 +49,7 @@ def measure_effect(case: Case, truth_key: str, store: Store) -> Record:
         raise LookupError("no truth to compare with")
     run = simulate(case.scene, case.engine, case.method, case.dt, _times(case), **dict(case.settings))
     record: Record = {"status": run.status, "reason": run.reason, "steps": run.steps}
-    if len(run.t) < _FEWEST:
+    if not len(run.t):
         return record
     at = np.searchsorted(run.t, truth["t"] - 1e-9)
     met = at < len(run.t)
@@ -82,14 +82,14 @@ def truth_times(scene: Scene) -> FloatArray:
 def _balance(scene: Scene, run: Trajectory) -> Record:
     """How far the energy is from what the effects' power leaves of it, and how well the integral of power is known.
 
-    In units of the scene's energy, or of the largest change where that is larger; nothing where there is no energy, or
-    more than a float can hold. The floor is what half of the samples would have given.
+    In units of the scene's energy, or of the largest change where that is larger; nothing where there are too few
+    samples, no energy, or more than a float can hold. The floor is what half of the samples would have given.
     """
     change = energy(scene, run.theta, run.omega)
     change = change - change[0]
     given = power(scene, run.t, run.theta, run.omega)
     scale = max(energy_scale(scene), float(np.abs(change).max()))
-    if not scale or not np.all(np.isfinite(change)) or not np.all(np.isfinite(given)):
+    if len(run.t) < _FEWEST or not scale or not np.all(np.isfinite(change)) or not np.all(np.isfinite(given)):
         return {}
     work = _integral(run.t, given)
     rough = _integral(run.t[::2], given[::2])

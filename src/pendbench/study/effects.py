@@ -7,7 +7,7 @@ the cost of a step of one chain with one effect at a time against that of the ba
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Final
 
@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pendbench.engines.protocol import Mapped
+from pendbench.engines.protocol import mapped_effects
 from pendbench.engines.registry import engine
 from pendbench.scene import Effects, Scene
 from pendbench.strict import input_error, show
@@ -131,18 +131,21 @@ class _Effects:
             reasons = {label: refusal(case) for label, case in every.items()}
             asked[name, method] = {label: {"status": "refused", "reason": reason} for label, reason in reasons.items()}
             cases = {label: case for label, case in every.items() if reasons[label] is None}
-            if set(cases) <= {BARE, DEFAULTS}:
-                continue
+            if set(cases) <= {BARE, DEFAULTS}:  # nothing to measure the bare chain against
+                cases = {}
             content = (*(case.content for case in cases.values()), version(name))
-            jobs[name, method] = job_of(measure_prices, content, 4 * self.limit, cases, BARE)
+            if cases:
+                jobs[name, method] = job_of(measure_prices, content, 4 * self.limit, cases, BARE)
         values = self.runner.run("prices", list(jobs.values()), lambda _, fault: fault_record(fault), alone=True)
-        for (name, method), job in jobs.items():
+        for (name, method), records in asked.items():
             where = {"scene": self.priced.name, "n": self.priced.n, "engine": name, "method": method}
-            for label, record in asked[name, method].items():
-                found = record if record["reason"] else values[job.key]
-                price = values[job.key].get("prices", {}).get(label, _NO_PRICE)
-                how = {"status": found["status"], "reason": found["reason"]}
-                self.prices.append({**where, "effect": label, **price, **how})
+            measured = values[jobs[name, method].key] if (name, method) in jobs else {}
+            for label, record in records.items():
+                found = record if record["reason"] else measured
+                if found:
+                    price = measured.get("prices", {}).get(label, _NO_PRICE)
+                    how = {"status": found["status"], "reason": found["reason"]}
+                    self.prices.append({**where, "effect": label, **price, **how})
 
     def _priced_cases(self, name: str, method: str) -> Iterator[tuple[str, Case]]:
         """The chain with each of its effects alone, with all, and bare."""
@@ -150,11 +153,11 @@ class _Effects:
         only_gravity = Effects(gravity=effects.gravity)
         bare = replace(self.priced, effects=only_gravity)
         yield BARE, Case(bare, name, method, step)
-        for effect in effects.named():
-            if effect != "gravity":
-                alone = replace(only_gravity, **{effect: getattr(effects, effect)})
-                yield effect, Case(replace(self.priced, effects=alone), name, method, step)
-        if set(effects.named()) - {"gravity"} != {effect}:
+        others = [effect for effect in self.priced.terms if effect != "gravity"]
+        for effect in others:
+            alone = replace(only_gravity, **{effect: getattr(effects, effect)})
+            yield effect, Case(replace(self.priced, effects=alone), name, method, step)
+        if len(others) > 1:
             yield ALL, Case(self.priced, name, method, step)
         if "default_flags" in engine(name).methods[method].settings:
             yield DEFAULTS, Case(bare, name, method, step, (("default_flags", 1),))
@@ -231,7 +234,7 @@ class _Effects:
 def _claimed(name: str, method: str, scene: Scene) -> int:
     """The order that the method claims, or what the engine's means for one of the effects leave of it."""
     its = engine(name)
-    mapped: Mapping[str, Mapped] = getattr(its, "effects", {})
+    mapped = mapped_effects(its)
     left = [mapped[effect].orders.get(method, math.inf) for effect in scene.terms if effect in mapped]
     return int(min([its.methods[method].order, *left]))
 
@@ -241,7 +244,7 @@ def _mapping_rows(engines: Sequence[str]) -> Iterator[Record]:
 
     for effect in names():
         for name in engines:
-            mapped = getattr(engine(name), "effects", {}).get(effect)
+            mapped = mapped_effects(engine(name)).get(effect)
             yield {
                 "effect": effect,
                 "engine": name,

@@ -330,6 +330,8 @@ def measure_race(case: Case) -> Record:
         "too slow": f"{found.reached:.3g} s of motion took {found.spent:.3g} s",
         "held": "",
     }[outcome]
+    if found.fault is not None:
+        reason = f"{found.fault.status}: {found.fault.reason}"
     return {
         "outcome": outcome,
         "reason": reason,
