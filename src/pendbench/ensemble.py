@@ -146,8 +146,12 @@ def _pool(threads: int | None, cluster: str | None) -> Iterator[tuple[Executor, 
         return
     if threads is not None and cluster != LOCAL:
         raise InputError(f"threads is {threads}; allowed: none, since a cluster has the workers that it has")
-    with connected(cluster, workers) as client, client.get_executor(pure=False) as pool:
-        yield pool, sum(client.nthreads().values()), lambda: bool(client.nthreads())
+    with connected(cluster, workers) as client:
+        pool = client.get_executor(pure=False)
+        try:
+            yield pool, sum(client.nthreads().values()), lambda: bool(client.nthreads())
+        finally:
+            pool.shutdown(wait=False)  # its own `with` would wait for a chunk that nobody is there to run
 
 
 def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None, cluster: str | None) -> Iterator[Any]:
