@@ -294,6 +294,38 @@ def test_a_worker_with_another_version_is_told_of(address, monkeypatch):
         DaskPool(address).__enter__()
 
 
+def test_workers_are_asked_again_where_one_dies_while_it_is_asked(address, monkeypatch):
+    """As its connection then breaks; three are asked: for their versions, their pools, the processor of the first."""
+    monkeypatch.setattr(connect, "_PAUSES_S", (0.0,))
+    broken, run = [], distributed.Client.run
+
+    def run_at_the_second_try(client, function, *arguments, **options):
+        if function not in broken:
+            broken.append(function)
+            raise distributed.comm.CommClosedError("in <TCP (closed)>: ConnectionResetError")
+        return run(client, function, *arguments, **options)
+
+    monkeypatch.setattr(distributed.Client, "run", run_at_the_second_try)
+    with DaskPool(address) as made:
+        assert values(outcomes(made, numbered(3))) == {"0": 0, "1": 1, "2": 2}
+    assert len(broken) == 3
+
+
+def test_who_does_not_answer_is_asked_again_and_not_for_ever(monkeypatch):
+    monkeypatch.setattr(connect, "_PAUSES_S", (0.0, 0.0))
+    answers = iter([ConnectionResetError("gone"), 7, *[ConnectionResetError("gone")] * 3])
+
+    def ask():
+        if isinstance(answer := next(answers), Exception):
+            raise answer
+        return answer
+
+    assert connect.asked_again(ask) == 7
+    with pytest.raises(ConnectionResetError):
+        connect.asked_again(ask)
+    assert next(answers, None) is None
+
+
 def test_nothing_is_left_on_the_workers(address):
     with DaskPool(address) as pool:
         name, pid = pool._name, next(iter(pool.run([job(os.getpid)]))).value

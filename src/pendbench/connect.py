@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from pendbench.errors import InputError, describe
 from pendbench.processes import deaf_to_interrupts, refuse_without_guard
@@ -18,7 +19,10 @@ from pendbench.strict import show
 LOCAL: Final = "local"
 _ANSWER_S: Final = 5.0
 _WORKERS_S: Final = 10.0
+#: Before the workers are asked again, s: one of them may just have died, and its connection with it.
+_PAUSES_S: Final = (0.2, 1.0, 3.0)
 _LOGGERS: Final = ("distributed", "distributed.client", "distributed.gc")
+_T = TypeVar("_T")
 _ALLOWED: Final = f"allowed: the address of a Dask scheduler, as in tcp://HOST:8786, or {LOCAL!r}"
 
 
@@ -58,13 +62,23 @@ def connected(cluster: str, workers: int) -> Iterator[Any]:
 def _check_versions(client: Any, cluster: str) -> None:
     """Raise InputError where a worker has no pendbench, or another than this one."""
     try:
-        found = client.run(source_digest)
+        found = asked_again(lambda: client.run(source_digest))
     except Exception as error:  # whatever keeps a worker from loading what it needs
         raise InputError(f"cluster {cluster!r}: a worker cannot run pendbench ({describe(error)})") from None
     for worker, digest in sorted(found.items()):
         if digest != source_digest():
             said = f"worker {worker} has another version of pendbench"
             raise InputError(f"cluster {cluster!r}: {said}; allowed: the same on every machine")
+
+
+def asked_again(ask: Callable[[], _T]) -> _T:
+    """What the workers answer, asked again where one of them dies in the midst of it."""
+    for pause in _PAUSES_S:
+        try:
+            return ask()
+        except OSError:  # Dask's own of a closed connection is one, too
+            time.sleep(pause)
+    return ask()
 
 
 def lost(cluster: str) -> str:

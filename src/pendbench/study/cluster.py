@@ -16,7 +16,7 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
 
-from pendbench.connect import connected, lost
+from pendbench.connect import asked_again, connected, lost
 from pendbench.engines.protocol import Fault
 from pendbench.errors import InputError, describe
 from pendbench.source import source_digest
@@ -66,6 +66,7 @@ class DaskPool:
 
     def __init__(self, cluster: str, workers: int = 1, store: Store | None = None) -> None:
         self.cluster, self.workers, self._store = cluster, workers, store
+        self._timer = ""
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -82,28 +83,35 @@ class DaskPool:
         """Give each worker its pool; raise InputError where one cannot do its work."""
         from pendbench.study.cluster_worker import Host, flaw_of
 
+        client = self._client
         token = key_of(self._name)
         if self._store is not None:
             self._store.save(token, token)
             stack.callback(self._store.forget, token)
         try:
-            self._client.register_plugin(Host(self._name, source_digest(), self._store, token))
             stack.callback(self._leave)
-            flaws = self._client.run(flaw_of, self._name)
+            asked_again(lambda: client.register_plugin(Host(self._name, source_digest(), self._store, token)))
+            flaws = asked_again(lambda: client.run(flaw_of, self._name))
+            processor_name = asked_again(self._ask_processor)
         except Exception as error:  # whatever keeps a worker from loading what it needs
             raise InputError(f"cluster {self.cluster!r}: a worker cannot run pendbench ({describe(error)})") from None
         if found := sorted(filter(None, flaws.values())):
             raise InputError(f"cluster {self.cluster!r}: {found[0]}")
-        threads: dict[str, int] = self._client.nthreads()
-        self.workers = sum(threads.values())
-        self._timer = min(threads)
-        names = self._client.run(processor, workers=[self._timer])
-        self.facts = {"cluster": self.cluster, "processor": names[self._timer]}
+        self.workers = max(1, sum(client.nthreads().values()))
+        self.facts = {"cluster": self.cluster, "processor": processor_name}
+
+    def _ask_processor(self) -> str:
+        """The processor's name, of the worker that times. Raises ConnectionError where there is none for now."""
+        if not (worker := self._timing_worker()):
+            raise ConnectionError("no worker is left")
+        name: str = self._client.run(processor, workers=[worker])[worker]
+        return name
 
     def _leave(self) -> None:
-        """Take the pools away again, where there still is a cluster."""
+        """Take the pools away again, where there still is a cluster; a worker that dies meanwhile has none left."""
         if self._client.status == "running":
-            self._client.unregister_worker_plugin(self._name)
+            with suppress(OSError, LookupError, ValueError):
+                self._client.unregister_worker_plugin(self._name)
 
     def run(self, jobs: Iterable[Job], *, alone: bool = False) -> Iterator[Outcome]:
         """The outcome of each job, in the order in which they finish. alone: one at a time, all by the same worker.
