@@ -137,6 +137,13 @@ def test_exponent_is_that_of_the_costs_and_the_end_is_told(folder):
     assert set(results.cases[results.cases.n > 4].n) == set()
 
 
+def test_exponent_of_an_engine_that_stops_early_is_that_of_its_last_decade(folder):
+    growth = searched(folder, fastest=10, steady=1.0, stops=6)[0].tables["growth"]
+    assert growth.step_exponent.to_numpy() == pytest.approx(1.5)
+    assert set(growth.n_from) == {1}
+    assert set(growth.n_to) == {4}
+
+
 def test_study_from_end_to_end(folder):
     table = run_study(folder / "small.toml", folder / "out", jobs=1)
     assert set(table.status) == {"ok"}

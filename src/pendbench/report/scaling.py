@@ -35,7 +35,8 @@ its fastest swing does. A method that chooses its steps is shown with its own, w
 explicit method of four stages evaluates the accelerations four times in a step."""
 _GROWTH: Final = """\
 The exponent p of cost ~ n^p by least squares on logarithms, from the first to the last number of links given, and why
-it went no further. 1 is a cost that grows like the chain."""
+it went no further: the last decade of an engine that stops before there are three lengths. 1 is a cost that grows like
+the chain."""
 _ERRORS: Final = """\
 The error after the same steps of the same motion, against our own Taylor method at a tolerance of 1e-13: the start of
 the fall, before any chaos, and shorter for more links, as their steps are."""
@@ -64,10 +65,16 @@ def answer(results: Results) -> str:
     if ratios:
         parts.append(f"That of {leader} is {listed(ratios)}.")
     fitted = [row for row in growth if not math.isnan(number(row, "step_exponent"))]
-    exponents = [f"{pair_name(row)} {shown('step_exponent', row['step_exponent'])}" for row in fitted]
+    exponents = [
+        f"{pair_name(row)} {shown('step_exponent', row['step_exponent'])} ({_fitted_range(row)})" for row in fitted
+    ]
     if exponents:
         parts.append(f"The cost of a step grows like n to the power of: {listed(exponents)}.")
     return " ".join(parts)
+
+
+def _fitted_range(row: Row) -> str:
+    return f"{shown('n_from', row['n_from'])} to {shown('n_to', row['n_to'])}"
 
 
 def _told_length(row: Row) -> str:

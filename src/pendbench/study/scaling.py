@@ -224,7 +224,7 @@ class _Scaling:
 
     def _growth_row(self, racer: Racer) -> Record:
         measured = {n: record for n, record in self.costs[racer].items() if record["status"] == "ok"}
-        fitted = [n for n in sorted(measured) if n >= self.options.fit_from]
+        fitted = self._fitted(sorted(measured))
         costs = np.array([measured[n]["step_us"] for n in fitted])
         stopped = [record for record in self.costs[racer].values() if record["status"] != "ok"]
         return {
@@ -237,6 +237,11 @@ class _Scaling:
             "status": stopped[0]["status"] if stopped else "ok",
             "reason": stopped[0]["reason"] if stopped else "",
         }
+
+    def _fitted(self, measured: list[int]) -> list[int]:
+        """The lengths that growth is fitted to; of an engine that stops too early for that, its last decade."""
+        fitted = [n for n in measured if n >= self.options.fit_from]
+        return fitted if len(fitted) >= 3 else [n for n in measured if 10 * n >= measured[-1]]
 
     def _longest_row(self, racer: Racer) -> Record:
         held = [trial for trial in self.trials[racer] if trial["outcome"] == "held"]
