@@ -363,13 +363,41 @@ def test_a_worker_that_is_killed_does_not_cost_an_ensemble_anything(cluster, add
 
 def test_an_ensemble_does_not_wait_for_workers_that_never_come_back(monkeypatch):
     monkeypatch.setattr(ensemble, "_LOOK_S", 0.2)
-    monkeypatch.setattr(ensemble, "_PATIENCE", 3)
+    monkeypatch.setattr(ensemble, "_PATIENCE_S", 1.0)
     with made_cluster(1) as alone:
         angles = np.zeros((60_000, 2))
         with pytest.raises(InputError, match="its scheduler or all of its workers are gone"):
             pb.simulate_ensemble(
                 "double", angles, times=[0.1], cluster=alone.scheduler_address, progress=lambda *_: alone.scale(0)
             )
+
+
+def test_an_ensemble_whose_result_cannot_be_fetched_ends(address, monkeypatch):
+    def fail(*_arguments, **_options):
+        raise MemoryError("no room for it")
+
+    monkeypatch.setattr(distributed.Client, "_gather_remote", fail)
+    with pytest.raises(MemoryError, match="no room for it"):
+        pb.simulate_ensemble("double", [[0.1, 0.2]], times=[0.1], cluster=address)
+
+
+def test_an_ensemble_begins_although_its_workers_are_not_there_now(address, monkeypatch):
+    monkeypatch.setattr(distributed.Client, "nthreads", lambda _: {})
+    run = pb.simulate_ensemble("double", [[0.1, 0.2]], times=[0.1], cluster=address)
+    assert run.status == ["ok"]
+
+
+def test_who_is_not_there_to_answer_is_asked_again(address, monkeypatch):
+    monkeypatch.setattr(connect, "_PAUSES_S", (0.0,))
+    found, run = [], distributed.Client.run
+
+    def run_later(*arguments):
+        found.append(run(*arguments) if found else {})
+        return found[-1]
+
+    monkeypatch.setattr(distributed.Client, "run", run_later)
+    with connect.connected(address, 1):
+        assert [len(answers) for answers in found] == [0, WORKERS]
 
 
 def refusal(capsys, *options: str) -> str:

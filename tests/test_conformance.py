@@ -222,6 +222,22 @@ class Reversed(Forgetful):
         return AnalyticEngine.build(self, dataclasses.replace(scene, effects=effects), method, dt, **settings)
 
 
+class Weak(Forgetful):
+    """Has too weak a motor, which only its second method knows, one of first order."""
+
+    methods = {
+        "taylor": dataclasses.replace(AnalyticEngine.methods["taylor"], effects=("gravity",)),
+        "euler": AnalyticEngine.methods["euler"],
+    }
+
+    def build(self, scene, method, dt, **settings):
+        effects = scene.effects
+        if effects.drive_torque is not None:
+            weak = dataclasses.replace(effects.drive_torque, amplitude=0.9 * effects.drive_torque.amplitude)
+            effects = dataclasses.replace(effects, drive_torque=weak)
+        return AnalyticEngine.build(self, dataclasses.replace(scene, effects=effects), method, dt, **settings)
+
+
 class Windy(Forgetful):
     """Names an effect that there is not."""
 
@@ -229,10 +245,7 @@ class Windy(Forgetful):
 
 
 BROKEN = {
-    "reverses a list": (
-        Reversed,
-        "simulates the effects it maps: rod_mass: what it changes",
-    ),
+    "reverses a list": (Reversed, "simulates the effects it maps: rod_mass: what it changes in half a second"),
     "claims a lower order": (lambda: wrapping(Passing, order=2), "converges: its order is 3.99, and it claims 2"),
     "claims a higher order": (lambda: wrapping(Passing, order=5), "converges: its order is 3.99, and it claims 5"),
     "drops half a step": (half_a_step_behind, "converges: its order is 1.0"),
@@ -242,6 +255,7 @@ BROKEN = {
         Forgetful,
         "simulates the effects it maps: drive_torque: what it changes in half a second",
     ),
+    "has a weak motor": (Weak, "simulates the effects it maps: drive_torque: what it changes in half a second"),
     "names an unknown effect": (Windy, "simulates the effects it maps: effects has 'wind'; allowed: gravity, "),
     "changes the scene": (changes_the_scene, "leaves the scene alone: the scene was changed"),
     "gives one array": (lambda: wrapping(OneArray), "gives arrays of its own: a state that was read changes"),

@@ -9,6 +9,7 @@ import pytest
 from pendbench.engines.registry import engine
 from pendbench.errors import InputError
 from pendbench.physics.energy import energy_scale
+from pendbench.report import scaling as report
 from pendbench.scene import load_scene
 from pendbench.study import scaling
 from pendbench.study.api import run_study
@@ -132,7 +133,7 @@ def test_exponent_is_that_of_the_costs_and_the_end_is_told(folder):
     assert results.tables["growth"].step_exponent.to_numpy() == pytest.approx(1.5)
     results, _ = searched(folder, fastest=10, steady=1.0, stops=4)
     growth = results.tables["growth"]
-    assert set(growth.n_to) == {3}
+    assert growth[["n_from", "n_to", "step_exponent"]].isna().all(axis=None)  # of two lengths there is none
     assert set(growth.status) == {"timed out"}
     assert set(results.cases[results.cases.n > 4].n) == set()
 
@@ -190,6 +191,10 @@ def test_race_against_a_method_that_chooses_its_steps():
         (("links = [1, 3, 4, 6]", "links = []"), "links"),
         (("links = [1, 3, 4, 6]", "links = [0]"), "links"),
         (("duration = 0.02", "duration = 0"), "duration"),
+        (
+            ("duration = 0.02", "duration = 0.02\ncoarsest = 0.1\nfinest = 0.2"),
+            "coarsest is 0.1; allowed: finest = 0.2 or more",
+        ),
     ],
 )
 def test_bad_study_is_one_line(folder, change, says):
@@ -199,3 +204,24 @@ def test_bad_study_is_one_line(folder, change, says):
         load_plan(path)
     assert says in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("angle", [0.0, math.pi])
+def test_pattern_that_nothing_moves_is_refused(folder, angle):
+    chain = f"[chain]\nn = 1\nmass = 1.0\nlength = 1.0\n[start]\nangles = {angle!r}\n"
+    (folder / "still.toml").write_text(f'title = "Still"\nduration = 1.0\n{chain}[effects]\ngravity = 9.81\n')
+    path = folder / "resting.toml"
+    path.write_text(STUDY.replace('"rope100"', '"still.toml"'))
+    with pytest.raises(InputError, match="is at rest and nothing pulls it; allowed: one that moves"):
+        load_plan(path)
+
+
+def told(**cells):
+    return report._told_length({"longest_n": 150, "outcome": "too slow", "reason": "", **cells})
+
+
+def test_length_is_a_bound_where_something_else_than_the_chain_ended_the_search():
+    assert told() == told(outcome="lost") == "150"
+    for outcome in ("refused", "timed out", "out of memory", "crashed"):
+        assert told(outcome=outcome) == "at least 150"
+    assert told(outcome="lost", reason="no step below 1e-06 s is tried") == "at least 150"

@@ -62,13 +62,21 @@ def connected(cluster: str, workers: int) -> Iterator[Any]:
 def _check_versions(client: Any, cluster: str) -> None:
     """Raise InputError where a worker has no pendbench, or another than this one."""
     try:
-        found = asked_again(lambda: client.run(source_digest))
+        found = asked_again(lambda: _digests(client))
     except Exception as error:  # whatever keeps a worker from loading what it needs
         raise InputError(f"cluster {cluster!r}: a worker cannot run pendbench ({describe(error)})") from None
     for worker, digest in sorted(found.items()):
         if digest != source_digest():
             said = f"worker {worker} has another version of pendbench"
             raise InputError(f"cluster {cluster!r}: {said}; allowed: the same on every machine")
+
+
+def _digests(client: Any) -> dict[str, str]:
+    """The version of every worker. Raises ConnectionError where there is none for now."""
+    found: dict[str, str] = client.run(source_digest)
+    if not found:
+        raise ConnectionError("no worker is left")
+    return found
 
 
 def asked_again(ask: Callable[[], _T]) -> _T:
@@ -83,7 +91,7 @@ def asked_again(ask: Callable[[], _T]) -> _T:
 
 def lost(cluster: str) -> str:
     """What there is to say where a cluster is no longer there."""
-    return f"cluster {cluster!r}: its scheduler or all of its workers are gone; what was finished is kept"
+    return f"cluster {cluster!r}: its scheduler or all of its workers are gone"
 
 
 def _dask() -> Any:

@@ -6,7 +6,7 @@ import itertools
 import math
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +19,7 @@ from pendbench.arrays import FloatArray
 from pendbench.connect import LOCAL, connected, lost
 from pendbench.errors import InputError, choose, printable
 from pendbench.processes import processors
+from pendbench.ranges import STEP
 from pendbench.scene import ANGLE, RATE, Scene, load_scene
 from pendbench.strict import show
 
@@ -36,9 +37,11 @@ _MOST_STEPS: Final = 10**6
 _MOST_EVER: Final = 10**15
 # Of a fixed step, which is asked for and whose work is known.
 _MOST_FIXED: Final = 10**9
-# How often a cluster is looked at, s, and how many looks in a row may find no worker.
+# A cluster is looked at after so long, s, and then after twice as long each time, to the longest: what takes long to
+# arrive is given the time. So long may it have no worker.
 _LOOK_S: Final = 2.0
-_PATIENCE: Final = 60
+_LONGEST_LOOK_S: Final = 64.0
+_PATIENCE_S: Final = 120.0
 _SMALLEST: Final = 1e-12
 
 
@@ -79,9 +82,9 @@ def simulate_ensemble(
 
     times (k,) s, rising; the scene's duration alone where None. method: `adaptive` (dt None), with the local error
     allowed per step; or `rk4`, whose times must be whole multiples of its step dt, s. A trajectory that needs more than
-    `most_steps` ends with the status `work limit`. threads: one for each processor where None. cluster: the address of
-    a Dask cluster to run on instead, or `local` for one with as many processes. progress(done, K) is called as
-    trajectories are done; whatever it raises cancels the rest.
+    `most_steps` of `adaptive` ends with the status `work limit`; `rk4` may take 1e9. threads: one for each processor
+    where None. cluster: the address of a Dask cluster to run on instead, or `local` for one with as many processes.
+    progress(done, K) is called as trajectories are done; whatever it raises cancels the rest.
 
     Results are those of `simulate` from each start, but for rounding. The starts and the states asked for, and a word
     for each, are all that grows with K: (16 (k + 1) n + 64) K bytes, and 32 n K before the first run, where that is
@@ -137,34 +140,32 @@ def first_flips(
 
 
 @contextmanager
-def _pool(threads: int | None, cluster: str | None) -> Iterator[tuple[Executor, int, Callable[[], bool]]]:
-    """Where chunks run, how many at once, and whether there is anyone to run them."""
+def _pool(threads: int | None, cluster: str | None) -> Iterator[tuple[Callable[..., Any], int, Callable[[], bool]]]:
+    """What submits chunks, how many run at once, and whether there is anyone to run them."""
     workers = _workers(threads)
     if cluster is None:
         with ThreadPoolExecutor(workers) as pool:
-            yield pool, workers, lambda: True
+            yield pool.submit, workers, lambda: True
         return
     if threads is not None and cluster != LOCAL:
         raise InputError(f"threads is {threads}; allowed: none, since a cluster has the workers that it has")
     with connected(cluster, workers) as client:
-        pool = client.get_executor(pure=False)
-        try:
-            yield pool, sum(client.nthreads().values()), lambda: bool(client.nthreads())
-        finally:
-            pool.shutdown(wait=False)  # its own `with` would wait for a chunk that nobody is there to run
+        # Not through Dask's executor: where a result cannot be fetched, its future never ends.
+        there = max(1, sum(client.nthreads().values()))
+        yield partial(client.submit, pure=False), there, lambda: bool(client.nthreads())
 
 
 def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None, cluster: str | None) -> Iterator[Any]:
     """The results of chunks of the starts, in order; a generator that is closed cancels those that have not begun."""
     make()  # what cannot be used is refused before anything runs
     waiting: list[tuple[int, int, Any]] = []
-    with _pool(threads, cluster) as (pool, workers, alive):
+    with _pool(threads, cluster) as (submit, workers, alive):
         size = _chunk(len(starts), starts.shape[1], workers)
         bounds = ((low, min(low + size, len(starts))) for low in range(0, len(starts), size))
         try:
             while True:
                 for low, high in itertools.islice(bounds, 2 * workers - len(waiting)):
-                    waiting.append((low, high, pool.submit(_run_chunk, make, starts[low:high])))
+                    waiting.append((low, high, submit(_run_chunk, make, starts[low:high])))
                 if not waiting:
                     return
                 low, high, future = waiting.pop(0)
@@ -176,12 +177,13 @@ def _in_chunks(make: Callable[[], Run], starts: FloatArray, threads: int | None,
 
 def _result(future: Any, alive: Callable[[], bool], cluster: str | None) -> Any:
     """What a chunk gave. Raises InputError where there has been nobody to run it for long."""
-    misses = 0
-    while misses <= _PATIENCE:
+    look, alone = _LOOK_S, 0.0
+    while alone < _PATIENCE_S:
         try:
-            return future.result(timeout=_LOOK_S)
+            return future.result(timeout=look)
         except TimeoutError:
-            misses = 0 if alive() else misses + 1
+            alone = 0.0 if alive() else alone + look
+            look = min(2.0 * look, _LONGEST_LOOK_S)
     raise InputError(lost(str(cluster)))
 
 
@@ -269,9 +271,10 @@ def _fixed_runner(scene: Scene, dt: float | None, times: FloatArray) -> Run:
 
 
 def _step(dt: object) -> float:
-    if isinstance(dt, bool) or not isinstance(dt, int | float) or not 0.0 < dt < math.inf:
-        raise InputError(f"dt is {show(dt)}; allowed: a step above 0, s")
-    return float(dt)
+    try:
+        return STEP.read(dt)
+    except ValueError as error:
+        raise InputError(f"dt is {'missing' if dt is None else show(dt)}; allowed: {error}, the step of rk4") from None
 
 
 def _step_counts(times: FloatArray, dt: float) -> npt.NDArray[np.int64]:
@@ -281,8 +284,11 @@ def _step_counts(times: FloatArray, dt: float) -> npt.NDArray[np.int64]:
             f"dt is {dt:g}; allowed: {times[-1] / _MOST_FIXED:g} or more, for {_MOST_FIXED:g} steps at most"
         )
     counts = np.rint(times / dt)
-    if np.abs(times / dt - counts).max() > 1e-6 or np.any(np.diff(counts) <= 0) or np.any((counts == 0) & (times > 0)):
-        raise InputError(f"times: allowed: whole multiples of dt = {dt:g} s")
+    astray = (np.abs(times / dt - counts) > 1e-6) | ((counts == 0) & (times > 0))
+    if astray.any():
+        raise InputError(f"times has {times[astray][0]:.9g} s; allowed: whole multiples of dt = {dt:g} s")
+    if np.any(np.diff(counts) < 1):
+        raise InputError(f"times are closer together than dt = {dt:g} s; allowed: different multiples of it")
     return counts.astype(np.int64)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -28,16 +28,23 @@ class Range:
         """The value as a float. Raises `ValueError`, saying what is allowed, for anything but a number in the range."""
         if isinstance(value, bool) or not isinstance(value, Real):
             raise ValueError(str(self))
-        number: Any = value  # compared before it is converted: an integer can be too large for a float
+        try:
+            number = float(value)
+        except OverflowError:  # an integer can be too large for a float
+            raise ValueError(str(self)) from None
         if not self.low <= number <= self.high:
             raise ValueError(str(self))
-        return float(number)
+        return number
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         """A file's number is checked as one given in Python is: ``Annotated[float, Range(...)]`` in a table."""
         from pydantic_core import core_schema
 
         return core_schema.no_info_plain_validator_function(self.read)
+
+
+#: A fixed step.
+STEP: Final = Range(1e-50, 1e50, "s")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pendbench.engines.protocol import AdaptiveSimulation, Engine, Fault, Method
 from pendbench.engines.registry import engine as engine_of
 from pendbench.engines.registry import engine_names, flaw_of
 from pendbench.errors import InputError, choose, describe, printable
-from pendbench.ranges import Range
+from pendbench.ranges import STEP
 from pendbench.scene import Scene, load_scene
 from pendbench.strict import show
 from pendbench.trajectory import STATUSES, Trajectory
@@ -27,7 +27,6 @@ SAMPLES: Final = 1000
 #: How far a time may be from a whole number of steps, in steps.
 SLACK: Final = 1e-6
 
-_DT: Final = Range(1e-50, 1e50, "s")
 _MOST_STEPS: Final = 2**53  # beyond this, floats do not count
 
 
@@ -120,7 +119,7 @@ def _step(name: str, method: Method, dt: object) -> float | None:
             raise InputError(f"dt is {show(dt)}; allowed: none, since method {name!r} chooses its steps")
         return None
     try:
-        return _DT.read(dt)
+        return STEP.read(dt)
     except ValueError as error:
         found = "missing" if dt is None else show(dt)
         raise InputError(f"dt is {found}; allowed: {error}, the step of method {name!r}") from None

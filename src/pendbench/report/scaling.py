@@ -34,9 +34,9 @@ The median cost of one step, of a chain that starts to fall. A chain of n links 
 its fastest swing does. A method that chooses its steps is shown with its own, whose length is its own affair. An
 explicit method of four stages evaluates the accelerations four times in a step."""
 _GROWTH: Final = """\
-The exponent p of cost ~ n^p by least squares on logarithms, from the first to the last number of links given, and why
-it went no further: the last decade of an engine that stops before there are three lengths. 1 is a cost that grows like
-the chain."""
+The exponent p of cost ~ n^p by least squares on logarithms, from the first to the last number of links given (the
+last decade of those that stop early), and why the measurement went no further. 1 is a cost that grows like the
+chain."""
 _ERRORS: Final = """\
 The error after the same steps of the same motion, against our own Taylor method at a tolerance of 1e-13: the start of
 the fall, before any chaos, and shorter for more links, as their steps are."""
@@ -78,9 +78,9 @@ def _fitted_range(row: Row) -> str:
 
 
 def _told_length(row: Row) -> str:
-    """How many links; at least so many, where a refusal or the finest step that is tried ended the search."""
+    """How many links; at least so many, where a refusal, a fault or the finest step ended the search."""
     length = shown("longest_n", row["longest_n"])
-    bounded = word(row, "outcome") == "refused" or "no step below" in word(row, "reason")
+    bounded = word(row, "outcome") not in ("too slow", "lost") or "no step below" in word(row, "reason")
     return f"at least {length}" if bounded else length
 
 

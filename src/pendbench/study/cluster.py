@@ -212,7 +212,7 @@ class _Tasks:
                 if task.worker is not None and task.worker not in there:
                     return task
             misses = 0 if there else misses + 1
-        raise InputError(lost(self._cluster))
+        raise InputError(f"{lost(self._cluster)}; what was finished is kept")
 
     def _came_of(self, future: Any, batch: Batch) -> Ran | None:
         from distributed import KilledWorker
@@ -227,7 +227,7 @@ class _Tasks:
         except KilledWorker:
             return None
         except (OSError, CancelledError, asyncio.CancelledError):
-            raise InputError(lost(self._cluster)) from None
+            raise InputError(f"{lost(self._cluster)}; what was finished is kept") from None
         except Exception as error:
             return Ran([(None, Fault("error", describe(error)))] * len(batch))
         return ran

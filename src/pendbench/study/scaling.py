@@ -44,10 +44,10 @@ _TIMING_COLUMNS: Final = ("step_us", "step_spread", "build_s", "first_call_s")
 
 
 class Options(StudyFile):
-    """links: how many, for the cost of a step. fit_from: over this many and more, growth is fitted. step, s, of a chain
-    of one link: n links get an n-th of it, as their fastest swing does; steps: so many, with which the cost and the
-    error are measured. duration: how long a chain has to keep up with the clock, s. coarsest and finest: steps of the
-    trials, s.
+    """links: how many, for the cost of a step. fit_from: over this many and more, growth is fitted, or over the last
+    decade where fewer than three lengths get there. step, s, of a chain of one link: n links get an n-th of it, as
+    their fastest swing does; steps: so many, with which the cost and the error are measured. duration: how long a chain
+    has to keep up with the clock, s. coarsest and finest: steps of the trials, s.
     """
 
     links: Annotated[list[Annotated[int, Field(ge=1, le=MAX_LINKS)]], Field(min_length=1)]
@@ -68,8 +68,17 @@ def check(plan: Plan) -> None:
         values = getattr(scene, name)
         if np.ptp(values) > 1e-12 * np.abs(values).max(initial=1.0):
             raise input_error(plan.where, f"scene {scene.name!r}: {name} differ; allowed: links that are alike")
-    if not energy_scale(scene):
-        raise input_error(plan.where, f"scene {scene.name!r} is at rest and free of gravity; allowed: one that moves")
+    if not energy_scale(scene) or _rests(scene):
+        raise input_error(plan.where, f"scene {scene.name!r} is at rest and nothing pulls it; allowed: one that moves")
+    if plan.options.coarsest < plan.options.finest:
+        said = f"coarsest is {plan.options.coarsest:g}; allowed: finest = {plan.options.finest:g} or more"
+        raise input_error(plan.where, said)
+
+
+def _rests(scene: Scene) -> bool:
+    """Whether its rods are at rest, straight down or up, and gravity alone acts."""
+    upright = np.abs(np.sin(scene.angles)).max() < 1e-9
+    return bool(upright and not scene.rates.any() and set(scene.terms) <= {"gravity"})
 
 
 def run(plan: Plan, runner: Runner) -> Results:
@@ -239,9 +248,11 @@ class _Scaling:
         }
 
     def _fitted(self, measured: list[int]) -> list[int]:
-        """The lengths that growth is fitted to; of an engine that stops too early for that, its last decade."""
+        """The lengths that growth is fitted to: those of the last decade, where fewer than three reach `fit_from`."""
         fitted = [n for n in measured if n >= self.options.fit_from]
-        return fitted if len(fitted) >= 3 else [n for n in measured if 10 * n >= measured[-1]]
+        if len(fitted) < 3:
+            fitted = [n for n in measured if 10 * n >= measured[-1]]
+        return fitted if len(fitted) >= 3 else []
 
     def _longest_row(self, racer: Racer) -> Record:
         held = [trial for trial in self.trials[racer] if trial["outcome"] == "held"]
