@@ -176,8 +176,8 @@ def test_flip_that_turns_back_within_a_step_is_seen():
             "closer together than dt",
         ),
         (
-            {"angles": [[0.1, 0.2]], "method": "rk4", "dt": 0.01, "times": [1e-9]},
-            "times has 1e-09 s; allowed: whole multiples",
+            {"angles": [[0.1, 0.2]], "method": "rk4", "dt": 0.01, "times": [1e-3]},
+            "times has 0.001 s; allowed: whole multiples",
         ),
         ({"angles": [[0.1, 0.2]], "times": ["x"]}, "times is no list of numbers"),
         ({"angles": [[0.1, 10**400]]}, "angles is no table of numbers"),

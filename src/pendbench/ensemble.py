@@ -20,6 +20,7 @@ from pendbench.connect import LOCAL, connected, lost
 from pendbench.errors import InputError, choose, printable
 from pendbench.processes import processors
 from pendbench.ranges import STEP
+from pendbench.recording import step_counts
 from pendbench.scene import ANGLE, RATE, Scene, load_scene
 from pendbench.strict import show
 
@@ -283,13 +284,7 @@ def _step_counts(times: FloatArray, dt: float) -> npt.NDArray[np.int64]:
         raise InputError(
             f"dt is {dt:g}; allowed: {times[-1] / _MOST_FIXED:g} or more, for {_MOST_FIXED:g} steps at most"
         )
-    counts = np.rint(times / dt)
-    astray = (np.abs(times / dt - counts) > 1e-6) | ((counts == 0) & (times > 0))
-    if astray.any():
-        raise InputError(f"times has {times[astray][0]:.9g} s; allowed: whole multiples of dt = {dt:g} s")
-    if np.any(np.diff(counts) < 1):
-        raise InputError(f"times are closer together than dt = {dt:g} s; allowed: different multiples of it")
-    return counts.astype(np.int64)
+    return step_counts(times, dt)
 
 
 def _words(outcomes: Any) -> npt.NDArray[np.str_]:

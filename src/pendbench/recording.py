@@ -93,7 +93,7 @@ def plan(
         if asked is None:
             asked = np.linspace(0.0, chosen.duration, SAMPLES + 1)
         return Asked(chosen, its, name, None, asked, None, numbers)
-    counts = _even_counts(chosen.duration, step) if asked is None else _counts(asked, step)
+    counts = _even_counts(chosen.duration, step) if asked is None else step_counts(asked, step)
     return Asked(chosen, its, name, step, np.asarray(counts * step, np.float64), counts, numbers)
 
 
@@ -138,8 +138,8 @@ def _times(times: npt.ArrayLike) -> FloatArray:
     return array
 
 
-def _counts(times: FloatArray, dt: float) -> npt.NDArray[np.int64]:
-    """How many steps each time is from the start."""
+def step_counts(times: FloatArray, dt: float) -> npt.NDArray[np.int64]:
+    """How many steps of dt (s) each of the times (k,) s is from the start; InputError for what is no whole multiple."""
     with np.errstate(over="ignore"):
         counts = _bounded(times / dt, dt)
     whole = np.rint(counts)

@@ -212,7 +212,10 @@ class _Tasks:
                 if task.worker is not None and task.worker not in there:
                     return task
             misses = 0 if there else misses + 1
-        raise InputError(f"{lost(self._cluster)}; what was finished is kept")
+        raise self._lost()
+
+    def _lost(self) -> InputError:
+        return InputError(f"{lost(self._cluster)}; what was finished is kept")
 
     def _came_of(self, future: Any, batch: Batch) -> Ran | None:
         from distributed import KilledWorker
@@ -227,7 +230,7 @@ class _Tasks:
         except KilledWorker:
             return None
         except (OSError, CancelledError, asyncio.CancelledError):
-            raise InputError(f"{lost(self._cluster)}; what was finished is kept") from None
+            raise self._lost() from None
         except Exception as error:
             return Ran([(None, Fault("error", describe(error)))] * len(batch))
         return ran
