@@ -25,15 +25,16 @@ import psutil
 from scipy.linalg import LinAlgError
 
 import pendbench as pb
-from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled
-from pendbench.engines.mjcf import alone, compile_chain, joint_values
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import compiled
+from pendbench.engines.mujoco.mjcf import alone, compile_chain, joint_values
 from pendbench.physics import dense
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance
-from pendbench.physics.recursion import accelerations, system_of, write_accelerations
-from pendbench.physics.system import System
-from pendbench.scene import Scene
+from pendbench.physics.kernels.massless import write_accelerations
+from pendbench.physics.kernels.recursion import accelerations, system_of
+from pendbench.physics.kernels.system import System
+from pendbench.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))

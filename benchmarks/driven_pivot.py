@@ -15,8 +15,8 @@ import numpy as np
 import pymunk
 
 import pendbench as pb
-from pendbench.engines.mjcf import alone
-from pendbench.scene import Effects, Scene
+from pendbench.engines.mujoco.mjcf import alone
+from pendbench.scene.scene import Effects, Scene
 
 AMPLITUDE, FREQUENCY, END = 0.05, 8.0, 1.0
 COUNTS = (250, 500, 1000, 2000)

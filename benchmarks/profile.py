@@ -15,11 +15,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendbench.compiled import compiled_for_threads
-from pendbench.physics.many import many_system_of, write_accelerations_of_many
-from pendbench.physics.recursion import inwards, system_of, write_accelerations
-from pendbench.physics.trigonometry import write_bends
-from pendbench.scene import Effects, Scene
+from pendbench.base.compiled import compiled_for_threads
+from pendbench.physics.kernels.ensemble import write_ensemble_accelerations
+from pendbench.physics.kernels.massless import inwards, write_accelerations
+from pendbench.physics.kernels.scratch import COSINE, SINE
+from pendbench.physics.kernels.table import ensemble_system_of, system_of
+from pendbench.physics.kernels.trigonometry import write_bends
+from pendbench.scene.scene import Effects, Scene
 
 SIZES: Final = (2, 10, 100, 1000, 10_000, 100_000)
 MANY: Final = (2, 10, 100)
@@ -32,7 +34,7 @@ SAMPLE_LINKS: Final = 1_000_000  # in one sample
 def bends(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:  # noqa: ARG001
     """Sines and cosines alone."""
     for _ in range(times):
-        write_bends(theta, system.scratch, 3, 2)
+        write_bends(theta, system.scratch, COSINE, SINE)
         theta[0] += 1e-12
 
 
@@ -57,7 +59,7 @@ def whole(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:
 def side_by_side(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:
     """Many chains at once."""
     for _ in range(times):
-        write_accelerations_of_many(system, theta, omega, out)
+        write_ensemble_accelerations(system, theta, omega, out)
         theta[0, 0] += 1e-12
 
 
@@ -93,7 +95,7 @@ def many(n: int) -> tuple[float, float]:
 
     def arguments() -> tuple[Any, ...]:
         theta, omega = rng.uniform(-3, 3, (n, LANES)), rng.uniform(-3, 3, (n, LANES))
-        return many_system_of(scene, LANES), theta, omega, np.zeros((n, LANES))
+        return ensemble_system_of(scene, LANES), theta, omega, np.zeros((n, LANES))
 
     mine = [arguments(), arguments()]
     one = per_link(lambda times: side_by_side(*mine[0], times), n * LANES)

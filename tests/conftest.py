@@ -1,4 +1,4 @@
-"""What holds for every test: numerical errors are loud, and plots need no screen."""
+"""What holds for every test: numerical errors are loud, plots need no screen, and no machine is too slow."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
+
+settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 

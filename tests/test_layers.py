@@ -9,87 +9,118 @@ from pathlib import Path
 import pytest
 
 import pendbench
+from pendbench.study.kinds import kinds
 
 PACKAGE = Path(pendbench.__file__).parent
 
 #: The house, from the ground up: a module may import from its own floor and from those below.
 FLOORS = (
-    ("errors",),
-    ("arrays", "bundled", "compiled", "files", "processes", "source", "strict"),
-    ("connect", "ranges"),
+    ("base.errors", "base.faults"),
+    ("base",),
+    ("execution",),
     ("effects",),
-    ("scene", "scene_file", "trajectory"),
+    ("scene",),
     ("solvers",),
     ("physics",),
+    ("scene.trajectory", "scene.run_file", "scene.picture", "scene.tensions"),  # what a run leaves knows its energy
     ("truth",),
     ("engines",),
-    ("recording",),
-    ("ensemble",),
+    ("measures",),
     ("study",),
     ("report",),
-    ("study.api", "study.__main__"),
+    ("kinds",),
+    ("commands",),
+    ("study.__main__", "__main__"),
 )
+#: What adapters of engines in joint angles share.
+JOINTED = ("engines.joint_run", "engines.joints", "engines.protocol")
 #: What a part of the house may import of the rest of it, where that is less than its floor would allow.
 ONLY = {
-    "solvers": {"arrays", "compiled"},
-    "physics": {"arrays", "compiled", "effects", "errors", "scene", "solvers"},
+    "solvers": {"base.arrays", "base.compiled"},
+    "physics": {"base.arrays", "base.compiled", "base.errors", "effects", "scene", "solvers"},
+    # Knows no pendulum.
+    "execution": {"base"},
     # Rows, and pure functions of arrays.
-    "report": {
-        "errors",
-        "files",
-        "strict",
-        "trajectory",
-        "study.flips",
-        "study.measure",
-        "study.results",
-        "study.verdict",
-    },
+    "report": {"base", "scene", "study.case", "study.kinds", "study.results"},
     # An adapter translates.
-    "engines.mujoco": {"arrays", "engines.mjcf", "engines.mujoco_forces", "engines.protocol", "scene", "trajectory"},
-    "engines.mujoco_forces": {"arrays", "engines.mjcf", "physics.acting", "scene"},
+    "engines.joints": {"base.arrays", "physics.acting", "scene"},
+    "engines.mujoco": {"base", "engines.joints", "engines.protocol", "physics.acting", "scene"},
     "engines.pymunk": {
-        "arrays",
+        "base.arrays",
+        "base.faults",
+        "engines.joints",
         "engines.protocol",
-        "engines.pymunk_bodies",
-        "engines.pymunk_forces",
+        "physics.acting",
+        "physics.geometry",
+        "scene",
+    },
+    "engines.pinocchio": {
+        "base.arrays",
+        "base.faults",
+        "engines.joints",
+        "engines.protocol",
         "physics.acting",
         "scene",
-        "trajectory",
     },
-    "engines.pymunk_bodies": {"arrays", "engines.protocol", "physics.acting", "physics.geometry", "scene"},
-    "engines.pymunk_forces": {"arrays", "physics.acting", "physics.geometry", "scene"},
-    "engines.pinocchio": {"arrays", "engines.protocol", "physics.acting", "scene", "trajectory"},
-    "engines.analytic": {
-        "arrays",
-        "engines.analytic_runs",
-        "engines.protocol",
-        "physics",
+    "engines.points": {"base.arrays", "engines.protocol", "physics.acting", "physics.geometry", "scene"},
+    "engines.scipy": {"base.arrays", "base.faults", "engines.protocol", "physics.acting", "scene"},
+    "engines.xpbd": {"", "base", "engines.points", "engines.protocol", "physics.acting", "physics.geometry", "scene"},
+    "engines.joint_run": {"base", "engines.joints", "engines.protocol", "physics.acting", "scene"},
+    "engines.dart": {"base.arrays", *JOINTED, "engines.silence", "scene"},
+    "engines.drake": {"base", *JOINTED, "physics.acting", "scene"},
+    "engines.exudyn": {"base", *JOINTED, "physics.acting", "scene"},
+    "engines.pybullet": {"base.arrays", *JOINTED, "engines.silence", "scene"},
+    "engines.mjx": {"base.faults", "engines.joints", "engines.mujoco", "engines.protocol", "scene"},
+    "engines.newton": {"base.arrays", *JOINTED, "engines.silence", "physics.acting", "scene"},
+    "engines.rapier": {
+        "base.faults",
+        *JOINTED,
+        "engines.points",
+        "physics.acting",
+        "physics.geometry",
         "scene",
-        "solvers",
-        "trajectory",
     },
-    "engines.analytic_runs": {"arrays", "engines.protocol", "physics", "scene", "solvers", "trajectory"},
+    "engines.box2d": {"base", "engines.points", "engines.protocol", "physics.acting", "scene"},
+    "engines.heyoka": {"base.faults", "effects", "engines.protocol", "scene"},
+    # A kind knows no other.
+    **{f"kinds.{name}": {part for parts in FLOORS[:-3] for part in parts} for name in kinds()},
+    # The source of what runs in workers is in every key, and so is all that it imports: pages are not.
+    **{f"kinds.{name}.work": {part for parts in FLOORS[:-4] for part in parts} for name in kinds()},
     # Errors and times are taken in separate runs, by modules that do not meet.
-    "study.clock": {"arrays", "engines.protocol", "scene"},
-    "study.measure": {"arrays"},
-    "study.flips": {"arrays"},
-    "study.verdict": {"arrays"},
+    "measures.clock": {"base.arrays", "base.faults", "engines.protocol", "scene"},
+    "measures.orders": {"base.arrays"},
+    "measures.prices": {"base.arrays"},
+    "measures.divergence": {"base.arrays"},
+    "measures.drift": {"base.arrays"},
+    "measures.flips": {"base.arrays"},
+    "measures.verdict": {"base.arrays"},
     "study.results": set(),
 }
 #: Libraries that only these may import.
 RESERVED = {
-    "mujoco": {"engines.mujoco", "engines.mujoco_forces", "engines.mjcf"},
-    "pymunk": {"engines.pymunk", "engines.pymunk_bodies", "engines.pymunk_forces"},
+    "mujoco": {"engines.mjx", "engines.mujoco", "scene.models"},
+    "jax": {"engines.mjx"},
+    "newton": {"engines.newton"},
+    "warp": {"engines.newton"},
+    "pymunk": {"engines.pymunk"},
     "heyoka": {"engines.heyoka"},
+    "pyb2d3": {"engines.box2d"},
+    "dartpy": {"engines.dart"},
+    "exudyn": {"engines.exudyn"},
+    "pydrake": {"engines.drake"},
+    "rapier3d": {"engines.rapier"},
+    "pybullet": {"engines.pybullet"},
     "pinocchio": {"engines.pinocchio"},
-    "matplotlib": {"report"},
-    "pebble": {"study.jobs"},
-    "distributed": {"connect", "study.cluster", "study.cluster_worker"},
-    "time": {"study.clock", "connect"},  # the second only waits
+    "matplotlib": {"report", "kinds", "scene.trajectory", "scene.picture"},
+    "pebble": {"execution.pool"},
+    "argcomplete": {"__main__", "commands"},
+    "distributed": {"execution"},
+    "flint": {"truth.proof"},
+    "time": {"measures.clock", "execution.connect", "truth.proof.enclose"},  # the second only waits
     "datetime": set(),
-    "psutil": {"study"},
-    "pydantic": {"scene_file", "strict", "study"},
-    "pydantic_core": {"effects.table", "ranges", "strict"},
+    "psutil": {"study", "base.processes"},
+    "pydantic": {"base.strict", "scene.toml_file", "study", "kinds", "commands.pages"},
+    "pydantic_core": {"base.ranges", "base.strict", "effects.table"},
 }
 #: Equations and methods know no file and no clock.
 PURE = ("physics", "solvers")
@@ -169,7 +200,9 @@ def test_each_library_has_its_place(module):
 
 @pytest.mark.parametrize("engine", ["mujoco", "pymunk", "analytic", "heyoka", "pinocchio"])
 def test_an_adapter_imports_its_own_library_and_numpy(engine):
-    foreign = libraries(MODULES[f"engines.{engine}"]) - set(sys.stdlib_module_names)
+    its = [path for module, path in MODULES.items() if within(module, f"engines.{engine}")]
+    foreign = set().union(*map(libraries, its)) - set(sys.stdlib_module_names)
+    assert its
     assert foreign <= {"numpy", engine}
 
 
@@ -186,17 +219,20 @@ def test_every_part_named_here_exists():
     ("module", "imported"),
     [
         ("physics.energy", "engines.protocol"),
-        ("solvers.explicit", "physics.recursion"),
-        ("scene", "physics.energy"),
-        ("errors", "strict"),
-        ("engines.mujoco", "physics.dense"),
-        ("engines.mujoco", "engines.pymunk"),
-        ("engines.registry", "recording"),
-        ("study.measure", "study.clock"),
-        ("study.chaos", "report.chaos"),
-        ("study.runner", "study.api"),
-        ("report.chaos", "study.runner"),
-        ("report.chaos", "engines.registry"),
+        ("solvers.explicit", "physics.kernels.recursion"),
+        ("scene.scene", "physics.energy"),
+        ("base.errors", "base.strict"),
+        ("execution.store", "scene.scene"),
+        ("engines.mujoco.adapter", "physics.dense"),
+        ("engines.mujoco.adapter", "engines.pymunk.adapter"),
+        ("measures.orders", "measures.clock"),
+        ("kinds.chaos.study", "kinds.cost.study"),
+        ("kinds.chaos.work", "kinds.chaos.columns"),
+        ("kinds.chaos.work", "report.numbers"),
+        ("study.plan", "report.names"),
+        ("study.plan", "commands.run"),
+        ("report.names", "study.plan"),
+        ("report.names", "engines.registry"),
     ],
 )
 def test_what_is_forbidden(module, imported):
@@ -206,9 +242,9 @@ def test_what_is_forbidden(module, imported):
 def test_imports_are_seen_wherever_they_are(tmp_path):
     file = tmp_path / "a.py"
     file.write_text(
-        "import os.path\nfrom typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from pendbench.report import rows\n"
-        "def f():\n    from pendbench.physics.dense import accelerations\n    import pendbench.study.api as a\n"
-        "    return import_module('pendbench.engines.mujoco'), 'pendbench.truth:reference'\n"
+        "import os.path\nfrom typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from pendbench.report import names\n"
+        "def f():\n    from pendbench.physics.dense import accelerations\n    import pendbench.commands.run as a\n"
+        "    return import_module('pendbench.engines.mujoco.adapter'), 'pendbench.truth.reference:reference'\n"
     )
-    assert ours(file) == {"report.rows", "physics.dense", "study.api", "engines.mujoco", "truth"}
+    assert ours(file) == {"report.names", "physics.dense", "commands.run", "engines.mujoco.adapter", "truth.reference"}
     assert libraries(file) == {"os", "typing"}

@@ -10,42 +10,63 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from pendbench.base.errors import InputError
+    from pendbench.commands.comparing import compare
+    from pendbench.commands.gating import gate
+    from pendbench.commands.judge import judge
+    from pendbench.commands.run import run_study
+    from pendbench.commands.showing import show
+    from pendbench.effects import Effects
+    from pendbench.engines.analytic.ensemble import Ensemble, first_flips, simulate_ensemble
     from pendbench.engines.conformance import check_engine
-    from pendbench.ensemble import Ensemble, first_flips, simulate_ensemble
-    from pendbench.errors import InputError
+    from pendbench.engines.recording import simulate
     from pendbench.physics.energy import energy
-    from pendbench.recording import simulate
-    from pendbench.scene import Scene, load_scene
-    from pendbench.study.api import run_study
-    from pendbench.trajectory import Trajectory
-    from pendbench.truth import reference
+    from pendbench.scene.run_file import load_run
+    from pendbench.scene.scene import Scene, load_scene
+    from pendbench.scene.trajectory import Trajectory
+    from pendbench.truth.proof.proof import prove
+    from pendbench.truth.reference import reference
 
 _HOMES = {
-    "Ensemble": "pendbench.ensemble",
-    "InputError": "pendbench.errors",
-    "Scene": "pendbench.scene",
-    "Trajectory": "pendbench.trajectory",
+    "Effects": "pendbench.effects",
+    "Ensemble": "pendbench.engines.analytic.ensemble",
+    "InputError": "pendbench.base.errors",
+    "Scene": "pendbench.scene.scene",
+    "Trajectory": "pendbench.scene.trajectory",
     "check_engine": "pendbench.engines.conformance",
+    "compare": "pendbench.commands.comparing",
     "energy": "pendbench.physics.energy",
-    "first_flips": "pendbench.ensemble",
-    "load_scene": "pendbench.scene",
-    "reference": "pendbench.truth",
-    "run_study": "pendbench.study.api",
-    "simulate": "pendbench.recording",
-    "simulate_ensemble": "pendbench.ensemble",
+    "first_flips": "pendbench.engines.analytic.ensemble",
+    "gate": "pendbench.commands.gating",
+    "judge": "pendbench.commands.judge",
+    "load_run": "pendbench.scene.run_file",
+    "load_scene": "pendbench.scene.scene",
+    "prove": "pendbench.truth.proof.proof",
+    "reference": "pendbench.truth.reference",
+    "run_study": "pendbench.commands.run",
+    "show": "pendbench.commands.showing",
+    "simulate": "pendbench.engines.recording",
+    "simulate_ensemble": "pendbench.engines.analytic.ensemble",
 }
 
 __all__ = [
+    "Effects",
     "Ensemble",
     "InputError",
     "Scene",
     "Trajectory",
     "check_engine",
+    "compare",
     "energy",
     "first_flips",
+    "gate",
+    "judge",
+    "load_run",
     "load_scene",
+    "prove",
     "reference",
     "run_study",
+    "show",
     "simulate",
     "simulate_ensemble",
 ]
@@ -58,4 +79,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted((*__all__, "__version__"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from pendbench.ranges import Range
+from pendbench.base.ranges import Range
 
 # A chain in upward gravity is the same chain with pi added to its angles.
 GRAVITY: Final = Range(0.0, 1e9, "m/s^2")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from pendbench.arrays import FloatArray
+from pendbench.base.arrays import FloatArray
+from pendbench.base.ranges import EachOf, Range
 from pendbench.effects.term import each
-from pendbench.ranges import EachOf, Range
 
 JOINT_DAMPING: Final = EachOf(Range(0.0, 1e50, "N m s/rad"), "joint")
 

@@ -1,12 +1,14 @@
-"""Springs in the joints, at rest where the chain hangs straight."""
+"""Springs in the joints, at rest where the chain hangs straight, or where joint_rest says."""
 
 from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from pendbench.arrays import FloatArray
+from pendbench.base.arrays import FloatArray
+from pendbench.base.ranges import EachOf, Range
 from pendbench.effects.term import each
-from pendbench.ranges import EachOf, Range
+
+Each = float | tuple[float, ...]
 
 JOINT_STIFFNESS: Final = EachOf(Range(0.0, 1e50, "N m/rad"), "joint")
 
@@ -14,15 +16,17 @@ JOINT_STIFFNESS: Final = EachOf(Range(0.0, 1e50, "N m/rad"), "joint")
 class JointStiffness(NamedTuple):
     """stiffness: (n,) N m/rad, of the pivot towards hanging, of the others towards the straight chain.
 
-    A spring counts turns: after one it does not rest where it did before.
+    A spring counts turns: after one it does not rest where it did before. rest: (n,) rad, the bend at which it
+    is at rest: 0, or what joint_rest says.
     """
 
     stiffness: FloatArray
+    rest: FloatArray
 
     @classmethod
-    def of(cls, value: float | tuple[float, ...], n: int) -> JointStiffness:
+    def of(cls, value: Each, n: int, joint_rest: Each = 0.0) -> JointStiffness:
         """The term for a chain of n links."""
-        return cls(each(value, n, "joint_stiffness", "joints"))
+        return cls(each(value, n, "joint_stiffness", "joints"), each(joint_rest, n, "joint_rest", "joints"))
 
     @staticmethod
     def example() -> Any:
@@ -35,10 +39,10 @@ class JointStiffness(NamedTuple):
 
     @staticmethod
     def joint_torque(term: JointStiffness, drive: Any, i: Any, bend: Any, rate: Any) -> Any:  # noqa: ARG004
-        """Against the bend."""
-        return -(term.stiffness[i] * bend)
+        """Against the bend from where it is at rest."""
+        return -(term.stiffness[i] * (bend - term.rest[i]))
 
     @staticmethod
     def joint_potential(term: JointStiffness, i: Any, bend: Any) -> Any:
         """Of the bent springs."""
-        return 0.5 * term.stiffness[i] * bend * bend
+        return 0.5 * term.stiffness[i] * (bend - term.rest[i]) * (bend - term.rest[i])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from pendbench.arrays import FloatArray
+from pendbench.base.arrays import FloatArray
+from pendbench.base.ranges import EachOf, Range
 from pendbench.effects.term import each
-from pendbench.ranges import EachOf, Range
 
 ROD_MASS: Final = EachOf(Range(0.0, 1e50, "kg"), "rod")
 

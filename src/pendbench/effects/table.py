@@ -6,12 +6,16 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Integral
-from typing import Any, ClassVar, Generic, TypeVar, get_type_hints
+from typing import Any, ClassVar, Final, Generic, TypeVar, get_type_hints
 
-from pendbench.errors import InputError, choose, printable
-from pendbench.strict import show
+from pendbench.base.errors import InputError, choose, printable
+from pendbench.base.ranges import Range
+from pendbench.base.strict import show
 
 Values = TypeVar("Values", bound="Parameters")
+
+#: When a drive begins: where its sine is at 0 s. Beyond 1e9 rad a sine has lost half of its digits.
+PHASE: Final = Range(-1e9, 1e9, "rad")
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,8 @@ class Parameters:
 def _read(allowed: Any, name: str, value: object) -> object:
     try:
         return allowed.read(value)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
     except ValueError as error:
         raise InputError(f"{name} is {show(value)}; allowed: {error}") from None
 

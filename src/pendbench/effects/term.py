@@ -5,12 +5,16 @@ A term is a NamedTuple of floats and arrays (n,). It has:
 - `of(value, n)`: the term for a chain of n links, from the value in the scene; raises `InputError` if they do not fit.
 - `is_nothing()`: whether all its numbers are 0, so that it can be left out.
 - `example()`: a value for two links as it stands in a file, unlike for each, for the checks that every engine passes.
+- `modifies()`, where all it does is in the law of another effect: that effect's name. The other's `of` gets the value
+  of this one too, by this one's name, and a scene that has not got the other is refused.
 
 and one or more of these laws, static methods in plain arithmetic (`+ - * /`, `np.sin`, `np.cos`, `np.sqrt`), which are
-compiled, and called with numpy arrays, and with numbers of 32 digits:
+compiled, and called with numpy arrays, and with numbers of 32 digits. Where all numbers of a term are 0 its laws give
+0: the reference has every effect in every scene, so that it is compiled once.
 
 - `pivot_acceleration(term, t)`: (x, y) m/s^2, what the pivot's acceleration against free fall is at time t s, and
-  `pivot_velocity(term, t)`: (x, y) m/s, with which the chain moves through the air.
+  `pivot_velocity(term, t)`: (x, y) m/s, with which the chain moves through the air, and
+  `pivot_position(term, t)`: (x, y) m, where that takes it, for pictures.
 - `mass_potential(term, x, y)`: J/kg at (x, y) m from the pivot, where a constant acceleration has a potential; an
   acceleration without one does work.
 - `joint_torque(term, drive, i, bend, rate)`: N m, what joint i feels, along its angle: on rod i, and against rod i - 1.
@@ -20,6 +24,7 @@ compiled, and called with numpy arrays, and with numbers of 32 digits:
   same from every direction: the recursion calls it in the rod's own frame, the dense form in that of the ground.
 - `drive(term, t)`: a number that the joint's law gets, the same for all joints, so that it is computed once.
 - `rod_masses(term)`: (n,) kg, of uniform rods.
+- `rotor_inertias(term)`: (n,) kg m^2, that turn with the joints' own angles.
 
 i is an index in a kernel and `...` for numpy, where bend, rate, x and y are arrays (..., n). An effect that pushes in
 none of these ways needs a law more, here and in `physics/laws.py`.
@@ -38,8 +43,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pendbench.arrays import FloatArray
-from pendbench.errors import InputError
+from pendbench.base.arrays import FloatArray
+from pendbench.base.errors import InputError
 
 
 class Term(Protocol):

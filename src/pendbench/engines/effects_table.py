@@ -11,6 +11,7 @@ from typing import Final
 from pendbench.effects import names
 from pendbench.engines.protocol import Engine, Mapped, mapped_effects
 from pendbench.engines.registry import engine
+from pendbench.scene.links import LINKS
 
 #: The engines of the table.
 ENGINES: Final = ("analytic", "mujoco", "pymunk", "pinocchio", "heyoka")
@@ -20,7 +21,7 @@ _BEGINS, _ENDS = "<!-- table -->\n", "<!-- end of table -->"
 
 def effects_table() -> str:
     """A row for each effect and engine, as Markdown. Raises `MissingEngineError` where one is not installed."""
-    rows = [_row(effect, engine(name)) for effect in names() for name in ENGINES]
+    rows = [_row(effect, engine(name)) for effect in (*names(), LINKS) for name in ENGINES]
     return "\n".join(["| effect | engine | by what means | order that is kept |", "|---|---|---|---|", *rows]) + "\n"
 
 

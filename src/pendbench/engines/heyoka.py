@@ -21,9 +21,11 @@ from typing import Any, Final
 
 import heyoka as hy
 
+from pendbench.base.faults import Fault
 from pendbench.effects import names as effect_names
-from pendbench.engines.protocol import AdaptiveSimulation, Fault, Mapped, Method, Setting, State
-from pendbench.scene import Scene
+from pendbench.engines.protocol import AdaptiveSimulation, Mapped, Method, Setting, State
+from pendbench.scene.links import LINKS
+from pendbench.scene.scene import Scene
 
 _TOLERANCE: Final = sys.float_info.epsilon  # heyoka's own default
 
@@ -40,8 +42,9 @@ _SETTINGS: Final = {
 _NOTE: Final = "Taylor series of order ceil(1 - ln(tolerance) / 2); the order claimed is that of the default tolerance"
 _METHODS: Final = {"taylor": Method(taylor_order(_TOLERANCE), adaptive=True, settings=_SETTINGS, note=_NOTE)}
 _ALONE: Final = Mapped("the adapter writes the equations of motion under gravity alone", refused=True)
-_EFFECTS: Final = {**dict.fromkeys(effect_names(), _ALONE), "gravity": Mapped("in the equations of motion")}
+_EFFECTS: Final = {**dict.fromkeys((*effect_names(), LINKS), _ALONE), "gravity": Mapped("in the equations of motion")}
 _MOST_LINKS: Final = 200  # 15 s to compile, on a busy machine
+_STEPS_A_CALL: Final = 200  # heyoka does not hear an interrupt
 _MOST_UNROLLED: Final = 11_000  # n (order^2 + n): unrolled code takes about a millisecond of compiling for each
 
 
@@ -109,9 +112,14 @@ class _Run:
         if self._outcome != hy.taylor_outcome.time_limit:  # which is how it calls having arrived
             return 0
         self._goal = time
-        self._outcome, _, _, taken, *_ = self._integrator.propagate_until(time, max_steps=self._left)
-        self._left -= taken
-        return int(taken)
+        before = self._left
+        while self._left > 0:
+            most = min(self._left, _STEPS_A_CALL)
+            self._outcome, _, _, taken, *_ = self._integrator.propagate_until(time, max_steps=most)
+            self._left -= taken
+            if self._outcome != hy.taylor_outcome.step_limit:
+                break
+        return int(before - self._left)
 
     def state(self) -> State:
         theta, omega = self._integrator.state[: 2 * self._n].copy().reshape(2, self._n)

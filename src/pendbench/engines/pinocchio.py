@@ -4,7 +4,7 @@ Pinocchio computes accelerations and has no integrator of its own: the steps her
 
 A point mass needs no inertia about itself: seen from its joint it has m l^2, which is all that ABA divides by.
 
-Measured with Pinocchio 4.1.0 against `pendbench.physics.recursion`: the worst of 20 to 80 random shapes, over the
+Measured with Pinocchio 4.1.0 against `physics.kernels.recursion`: the worst of 20 to 80 random shapes, over the
 largest component. Unlike links with ratios below 4: 2e-14. A tip of 1e-4 or 1e-8 of the other masses, 2 to 100 links:
 2e-15, nothing is lost. A tip of 1e4 or 1e8 of them: 7e-16 for two links, but from three on 4e-12 and 5e-8, as many
 digits as the ratio has, since ABA subtracts inertias that are then nearly equal. Lengths over six decades: 9e-7.
@@ -20,10 +20,12 @@ from typing import Any, Final
 import numpy as np
 import pinocchio as pin
 
-from pendbench.arrays import FloatArray
-from pendbench.engines.protocol import Fault, Mapped, Method, Simulation, State
+from pendbench.base.arrays import FloatArray
+from pendbench.base.faults import Fault
+from pendbench.engines.joints import absolute_values, bodies, joint_forces, joint_values
+from pendbench.engines.protocol import Mapped, Method, Simulation, State, needed_step, not_finite
 from pendbench.physics import acting
-from pendbench.scene import Scene
+from pendbench.scene.scene import Scene
 
 _NOTE: Final = "in Python around pinocchio.aba: Pinocchio has no integrator of its own"
 _METHODS: Final = {
@@ -35,10 +37,14 @@ _EFFECTS: Final = {
     "gravity": Mapped("gravity of the model"),
     "joint_damping": Mapped(_TORQUES),
     "joint_stiffness": Mapped(_TORQUES),
+    "joint_rest": Mapped(_TORQUES),
+    "joint_torque": Mapped(_TORQUES),
     "air_drag": Mapped(_TORQUES),
     "rod_mass": Mapped("mass, lever and inertia of the bodies"),
     "driven_pivot": Mapped("gravity of the pivot's frame, set at every stage of a step"),
     "drive_torque": Mapped(_TORQUES),
+    "armature": Mapped("armature of the model"),
+    "links": Mapped("mass, lever and inertia of the bodies"),
 }
 
 # Pinocchio's data holds tensors of second derivatives, 32 n^3 bytes, whether or not they are asked for. Measured:
@@ -46,29 +52,18 @@ _EFFECTS: Final = {
 _MOST_LINKS: Final = 200
 
 
-def joint_values(absolute: FloatArray) -> FloatArray:
-    """Angles or rates (n,) between each rod and the one before it, from those of the rods."""
-    return np.diff(absolute, prepend=0.0)
-
-
 def chain_model(scene: Scene) -> Any:
     """The chain in Pinocchio: x points down, and each rod lies along the x axis of its joint's frame."""
     model = pin.Model()
     model.gravity = _weight(scene, 0.0)
-    joint, end, rods = 0, np.zeros(3), acting.rods(scene)
-    for i in range(scene.n):
-        joint = model.addJoint(joint, pin.JointModelRZ(), pin.SE3(np.eye(3), end), f"joint {i}")
-        end = np.array([scene.lengths[i], 0.0, 0.0])
+    joint, end = 0, np.zeros(3)
+    for length, mass, centre, inertia in np.stack([scene.lengths, *bodies(scene)], axis=1).tolist():
+        joint = model.addJoint(joint, pin.JointModelRZ(), pin.SE3(np.eye(3), end), f"joint {joint}")
+        end = np.array([length, 0.0, 0.0])
         # appendBodyToJoint would add it to nothing; that sum takes masses below 2e-16 kg for 2e-16 kg, in the lever.
-        model.inertias[joint] = _inertia(float(scene.masses[i]), float(rods[i]), end)
+        model.inertias[joint] = pin.Inertia(mass, np.array([centre, 0.0, 0.0]), np.diag([0.0, inertia, inertia]))
+    model.armature = acting.rotor_inertias(scene)
     return model
-
-
-def _inertia(mass: float, rod: float, end: FloatArray) -> Any:
-    """A point at `end` (3,) m and a uniform rod from the joint to there, whose own inertia lies across it."""
-    both = mass + rod
-    middle = rod / 12.0 + mass * rod / (4.0 * both)
-    return pin.Inertia(both, end * ((mass + 0.5 * rod) / both), np.diag([0.0, 1.0, 1.0]) * middle * (end @ end))
 
 
 def _weight(scene: Scene, t: float) -> Any:
@@ -104,9 +99,7 @@ class _Run:
         return found
 
     def _torques(self, t: float, q: FloatArray, v: FloatArray) -> FloatArray:
-        """What pushes a rod pushes all joints before it."""
-        on_rods = acting.generalized_forces(self._scene, t, np.cumsum(q), np.cumsum(v))
-        return np.asarray(np.cumsum(on_rods[::-1])[::-1])
+        return joint_forces(acting.generalized_forces(self._scene, t, absolute_values(q), absolute_values(v)))
 
     def _euler(self, t: float) -> None:
         self._v = self._v + self._dt * self._accelerations(t, self._q, self._v)
@@ -126,12 +119,10 @@ class _Run:
 
     def state(self) -> State:
         with np.errstate(all="ignore"):
-            return State(np.cumsum(self._q), np.cumsum(self._v))
+            return State(absolute_values(self._q), absolute_values(self._v))
 
     def health(self) -> Fault | None:
-        if not np.all(np.isfinite(self.state()[:2])):  # sums: not finite where a joint's is not
-            return Fault("not finite", "an angle or a rate is not finite")
-        return None
+        return not_finite(self.state())
 
 
 class PinocchioEngine:
@@ -153,6 +144,5 @@ class PinocchioEngine:
 
     def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:  # noqa: ARG002
         """A run at time 0; no method has settings."""
-        if dt is None:
-            raise ValueError(f"method {method!r} needs a step")
+        dt = needed_step(method, dt)
         return _Run(scene, method, dt)

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple, Protocol, runtime_checkable
+from numbers import Real
+from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
-from pendbench.arrays import FloatArray
-from pendbench.scene import Scene
+import numpy as np
+
+from pendbench.base.arrays import FloatArray
+from pendbench.base.errors import InputError
+from pendbench.base.faults import Fault
+from pendbench.base.strict import show
+from pendbench.scene.scene import Scene
 
 
 class State(NamedTuple):
@@ -16,13 +22,6 @@ class State(NamedTuple):
     theta: FloatArray
     omega: FloatArray
     gap: float = 0.0
-
-
-class Fault(NamedTuple):
-    """What went wrong: one of `trajectory.STATUSES`, and the reason in words."""
-
-    status: str
-    reason: str
 
 
 @dataclass(frozen=True)
@@ -34,6 +33,20 @@ class Setting:
     high: float
     integer: bool = False
     note: str = ""
+
+    def fits(self, value: object) -> bool:
+        """Whether the value is such a number."""
+        if isinstance(value, bool) or not isinstance(value, Real):
+            return False
+        number: Any = value
+        return bool(self.low <= number <= self.high and not (self.integer and number != int(number)))
+
+    def read(self, name: str, value: Any) -> float:
+        """The value of what is called `name`. Raises `InputError` where it does not fit."""
+        if not self.fits(value):
+            kind = "a whole number" if self.integer else "a number"
+            raise InputError(f"{name} is {show(value)}; allowed: {kind} from {self.low:g} to {self.high:g}")
+        return int(value) if self.integer else float(value)
 
 
 @dataclass(frozen=True)
@@ -56,6 +69,8 @@ class Method:
     order: the order of convergence it claims. adaptive: it chooses its own steps and is built with dt None. dense: its
     steps give every state on the way, so several times can fall into one. substeps: it divides its step as it sees fit.
     effects: those it can simulate, None for all of its engine.
+    plateau: the error that no step and no tolerance brings it below, rad after a second of a calm swing of two links,
+    where that is more than rounding of doubles: soft joints, single precision. single: it is in single precision.
     note: one line for the documentation.
     """
 
@@ -66,6 +81,8 @@ class Method:
     dense: bool = False
     substeps: bool = False
     effects: frozenset[str] | None = None
+    plateau: float = 0.0
+    single: bool = False
 
     def with_defaults(self, given: Mapping[str, float]) -> dict[str, float]:
         """The settings `given`, and the defaults of those that are not; one without either is left out."""
@@ -142,3 +159,30 @@ def refusal(engine: Engine, method: str, scene: Scene) -> str | None:
         if known is not None and name not in known:
             return f"method {method!r} has no {name}"
     return engine.refuses(scene)
+
+
+def needed_step(method: str, dt: float | None) -> float:
+    """The step, s, that a method with a fixed one is built with. Raises ValueError where there is none."""
+    if dt is None:
+        raise ValueError(f"method {method!r} needs a step")
+    return dt
+
+
+def not_finite(state: State) -> Fault | None:
+    """The fault of a state with an angle or a rate that is no number; None where all are."""
+    if np.isfinite(state.theta).all() and np.isfinite(state.omega).all():
+        return None
+    return Fault("not finite", "an angle or a rate is not finite")
+
+
+def setting_line(engine: Engine, method: str, dt: float | None, settings: Mapping[str, float]) -> str:
+    """A line that sets a method and its step: in the engine's own words where its adapter has them, else in ours.
+
+    An adapter may have `setting_line(method, dt, settings)`, for those who use the engine without pendbench.
+    """
+    own = getattr(engine, "setting_line", None)
+    if own is not None:
+        return str(own(method, dt, settings))
+    step = {} if dt is None else {"dt": dt}
+    chosen = ", ".join(f"{name}={value!r}" for name, value in {**step, **settings}.items())
+    return f"pb.simulate(scene, {engine.name!r}, {method!r}{', ' if chosen else ''}{chosen})"

@@ -7,12 +7,13 @@ without arguments, or a function, that gives an `Engine`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final, NamedTuple
 
+from pendbench.base.errors import InputError, MissingEngineError, choose, describe, printable
+from pendbench.base.strict import show
 from pendbench.engines.protocol import Engine, Method
-from pendbench.errors import InputError, MissingEngineError, choose, describe, printable
-from pendbench.strict import show
 
 GROUP: Final = "pendbench.engines"
 
@@ -21,28 +22,59 @@ Factory = Callable[[], Engine]
 # Where each is loaded from, and what pip installs to make that work. pyproject.toml says the same to others; this
 # table serves a source checkout, and keeps other packages from taking these names.
 _BUNDLED: Final = {
-    "analytic": ("pendbench.engines.analytic:AnalyticEngine", "pendbench"),
+    "analytic": ("pendbench.engines.analytic.adapter:AnalyticEngine", "pendbench"),
+    "box2d": ("pendbench.engines.box2d:Box2dEngine", "pendbench"),
+    "dart": ("pendbench.engines.dart:DartEngine", "pendbench"),
+    "drake": ("pendbench.engines.drake:DrakeEngine", "pendbench"),
+    "exudyn": ("pendbench.engines.exudyn:ExudynEngine", "pendbench"),
     "heyoka": ("pendbench.engines.heyoka:HeyokaEngine", "pendbench"),
-    "mujoco": ("pendbench.engines.mujoco:MujocoEngine", "mujoco-core"),
+    "mujoco": ("pendbench.engines.mujoco.adapter:MujocoEngine", "mujoco-core"),
+    "mjx": ("pendbench.engines.mjx:MjxEngine", "pendbench"),
+    "newton": ("pendbench.engines.newton:NewtonEngine", "pendbench"),
     "pinocchio": ("pendbench.engines.pinocchio:PinocchioEngine", "pendbench"),
-    "pymunk": ("pendbench.engines.pymunk:PymunkEngine", "pymunk"),
+    "pybullet": ("pendbench.engines.pybullet:PybulletEngine", "pendbench"),
+    "pymunk": ("pendbench.engines.pymunk.adapter:PymunkEngine", "pymunk"),
+    "rapier": ("pendbench.engines.rapier.adapter:RapierEngine", "pendbench"),
+    "scipy": ("pendbench.engines.scipy:ScipyEngine", "scipy"),
+    "xpbd": ("pendbench.engines.xpbd.adapter:XpbdEngine", "pendbench"),
 }
 # Those whose program comes with an extra of that package, of the same name.
-_EXTRAS: Final = frozenset({"heyoka", "pinocchio"})
+_EXTRAS: Final = frozenset(_BUNDLED) - {"analytic", "mujoco", "pymunk", "scipy", "xpbd"}
+# Those that run where no engines are named; the others are many, and most step in Python or compile for long.
+_UNASKED: Final = frozenset({"analytic", "heyoka", "mujoco", "pinocchio", "pymunk"})
 _registered: dict[str, Factory] = {}
 
 
 def register(name: str, factory: Factory) -> None:
     """Make an engine known under `name` in this process, in place of any other of that name.
 
-    Worker processes do not see it: an engine that a study is to run in parallel needs an entry point.
+    Worker processes do not see it: an engine that a study is to run in parallel needs an entry point. Raises
+    `InputError` for the name of a bundled engine, which a worker would run instead.
     """
+    if name in _BUNDLED:
+        raise InputError(f"engine {name!r} comes with pendbench; allowed: another name for yours")
     _registered[name] = factory
 
 
 def engine_names() -> tuple[str, ...]:
     """The names of all engines that can be asked for, sorted. None of them is loaded."""
     return tuple(sorted({*_registered, *_BUNDLED, *entry_points(group=GROUP).names}))
+
+
+def only_by_name(name: str) -> bool:
+    """Whether an engine runs only where it is named, and not where all are that are installed. Loads nothing."""
+    return name in _BUNDLED and name not in _UNASKED
+
+
+def is_foreign(name: str) -> bool:
+    """Whether the engine is somebody else's, found through an entry point: nobody here has ever loaded it."""
+    return name not in _registered and name not in _BUNDLED and name in entry_points(group=GROUP).names
+
+
+def try_to_load(name: str) -> None:
+    """Load an engine and ask its version, whatever that raises: to see whether the process survives it."""
+    with suppress(Exception, SystemExit):
+        engine(name).version()
 
 
 def engine(name: str) -> Engine:

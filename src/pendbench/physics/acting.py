@@ -10,31 +10,51 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pendbench.arrays import FloatArray
-from pendbench.errors import InputError
+from pendbench.base.arrays import FloatArray
+from pendbench.base.errors import InputError
 from pendbench.physics.geometry import velocities
-from pendbench.scene import Scene
+from pendbench.scene.links import Links
+from pendbench.scene.scene import Scene
 
 
 def _with(scene: Scene, law: str) -> list[Any]:
     return [term for term in scene.terms.values() if hasattr(term, law)]
 
 
-def rods(scene: Scene) -> FloatArray:
-    """The rods' own masses (n,) kg."""
-    masses = [term.rod_masses(term) for term in _with(scene, "rod_masses")]
-    return np.asarray(np.sum([np.zeros(scene.n), *masses], axis=0))
+def links(scene: Scene) -> Links:
+    """What each link weighs beside the point at its end: the scene's rigid links, or uniform rods of some mass or none.
+
+    equations.md (E53).
+    """
+    if scene.links is not None:
+        return scene.links
+    masses = np.sum([np.zeros(scene.n), *(term.rod_masses(term) for term in _with(scene, "rod_masses"))], axis=0)
+    return Links(masses, 0.5 * scene.lengths, masses * scene.lengths**2 / 12.0)
+
+
+def has_links(scene: Scene) -> bool:
+    """Whether there is more than points on massless rods."""
+    return scene.links is not None or bool(_with(scene, "rod_masses"))
 
 
 def lumped_masses(scene: Scene) -> FloatArray:
-    """The masses (n,) kg with half of each rod at each of its ends. equations.md (E36)."""
-    half = 0.5 * rods(scene)
-    return np.asarray(scene.masses + half + np.append(half[1:], 0.0))
+    """The masses (n,) kg with a share of each link at each of its ends, as its centre is near. equations.md (E53)."""
+    its = links(scene)
+    outer = its.mass * (its.centre / scene.lengths)
+    inner = its.mass * ((scene.lengths - its.centre) / scene.lengths)
+    return np.asarray(scene.masses + outer + np.append(inner[1:], 0.0))
 
 
-def rod_inertias(scene: Scene) -> FloatArray:
-    """What lumped rods have too much of on C's diagonal, (n,) kg m^2, negative. equations.md (E36)."""
-    return -rods(scene) * scene.lengths**2 / 6.0
+def link_inertias(scene: Scene) -> FloatArray:
+    """What links with their masses at their ends lack on C's diagonal, (n,) kg m^2; often negative. (E53)."""
+    its = links(scene)
+    return np.asarray(its.inertia - its.mass * its.centre * (scene.lengths - its.centre))
+
+
+def rotor_inertias(scene: Scene) -> FloatArray:
+    """The rotors' inertias in the joints, (n,) kg m^2. equations.md (E55)."""
+    rotors = [term.rotor_inertias(term) for term in _with(scene, "rotor_inertias")]
+    return np.asarray(np.sum([np.zeros(scene.n), *rotors], axis=0))
 
 
 def bends(angles: FloatArray) -> FloatArray:
@@ -45,6 +65,11 @@ def bends(angles: FloatArray) -> FloatArray:
 def pivot_acceleration(scene: Scene, t: npt.ArrayLike) -> FloatArray:
     """The pivot's acceleration against free fall, (..., 2) m/s^2. equations.md (E37)."""
     return _pivot(_with(scene, "pivot_acceleration"), t)
+
+
+def pivot_position(scene: Scene, t: npt.ArrayLike) -> FloatArray:
+    """Where the pivot is, (..., 2) m: at the origin where nothing drives it. t: (...,) s. equations.md (E37)."""
+    return _pivot(_with(scene, "pivot_position"), t, "pivot_position")
 
 
 def pivot_velocity(scene: Scene, t: npt.ArrayLike) -> FloatArray:

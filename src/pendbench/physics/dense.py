@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from pendbench.arrays import FloatArray
+from pendbench.base.arrays import FloatArray
 from pendbench.physics import acting
-from pendbench.scene import Scene
+from pendbench.scene.scene import Scene
 
 
 def hanging_masses(masses: FloatArray) -> FloatArray:
@@ -20,9 +20,9 @@ def hanging_masses(masses: FloatArray) -> FloatArray:
 
 
 def mass_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
-    """C(theta), (n, n) kg m^2, symmetric and positive definite. theta: (n,) rad. equations.md (E7), (E36)."""
+    """C(theta), (n, n) kg m^2, symmetric and positive definite. theta: (n,) rad. equations.md (E7), (E53), (E55)."""
     lumped = _pair_inertias(scene) * np.cos(np.subtract.outer(theta, theta))
-    return np.asarray(lumped + np.diag(acting.rod_inertias(scene)))
+    return np.asarray(lumped + np.diag(acting.link_inertias(scene)) + _rotor_matrix(scene))
 
 
 def coupling_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
@@ -52,6 +52,12 @@ def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float =
 
 
 def _pair_inertias(scene: Scene) -> FloatArray:
-    """M_max(i,j) l_i l_j, (n, n). M never grows outwards, so M_max(i,j) is the smaller of M_i and M_j."""
-    hanging = hanging_masses(acting.lumped_masses(scene))
-    return np.asarray(np.minimum.outer(hanging, hanging) * np.outer(scene.lengths, scene.lengths))
+    """M_max(i,j) l_i l_j, (n, n)."""
+    hanging, links = hanging_masses(acting.lumped_masses(scene)), np.arange(scene.n)
+    return np.asarray(hanging[np.maximum.outer(links, links)] * np.outer(scene.lengths, scene.lengths))
+
+
+def _rotor_matrix(scene: Scene) -> FloatArray:
+    """What the rotors in the joints add to C, (n, n) kg m^2. equations.md (E55)."""
+    bends = np.eye(scene.n) - np.eye(scene.n, k=-1)
+    return np.asarray(bends.T @ (acting.rotor_inertias(scene)[:, np.newaxis] * bends))

@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pendbench.arrays import FloatArray
-from pendbench.errors import InputError
+from pendbench.base.arrays import FloatArray
+from pendbench.base.errors import InputError
 from pendbench.physics import acting, dense
-from pendbench.physics.geometry import positions, velocities
-from pendbench.scene import Scene, load_scene
+from pendbench.physics.geometry import TURN, positions, velocities
+from pendbench.scene.scene import Scene, load_scene
 
 
 def energy(scene: Scene | str, theta: npt.ArrayLike, omega: npt.ArrayLike) -> FloatArray:
@@ -20,6 +20,11 @@ def energy(scene: Scene | str, theta: npt.ArrayLike, omega: npt.ArrayLike) -> Fl
 
     Where the pivot is driven, this is the energy for someone who rides on it. scene: a `Scene`, or the name or path of
     one. theta: (..., n) rad; omega: (..., n) rad/s. Raises InputError where the two have other shapes than that.
+
+    >>> import pendbench as pb
+    >>> scene = pb.Scene.chain(n=1, length=2.0, mass=3.0, angles=0.0, gravity=10.0)
+    >>> float(pb.energy(scene, [0.0], [1.0]))  # 3 kg, 2 m below the pivot, at 2 m/s
+    -54.0
     """
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     theta, omega = np.asarray(theta, np.float64), np.asarray(omega, np.float64)
@@ -29,15 +34,16 @@ def energy(scene: Scene | str, theta: npt.ArrayLike, omega: npt.ArrayLike) -> Fl
 
 
 def kinetic_energy(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    """That of masses and rods, (...,) J: a sum of squares, so it never cancels. equations.md (E3), (E36)."""
+    """That of masses, links and rotors, (...,) J: a sum of squares, so it never cancels. (E3), (E53), (E55)."""
     speeds = velocities(scene.lengths, theta, omega)
     total = 0.5 * np.sum(scene.masses * np.sum(speeds**2, axis=-1), axis=-1)
-    rods = acting.rods(scene)
-    if rods.any():
+    if acting.has_links(scene):
+        its = acting.links(scene)
         inner = np.concatenate([np.zeros_like(speeds[..., :1, :]), speeds[..., :-1, :]], axis=-2)
-        middle = np.sum((0.5 * (speeds + inner)) ** 2, axis=-1)
-        total += 0.5 * np.sum(rods * (middle + (scene.lengths * omega) ** 2 / 12.0), axis=-1)
-    return np.asarray(total)
+        share = (its.centre / scene.lengths)[:, np.newaxis]
+        centres = np.sum((inner + share * (speeds - inner)) ** 2, axis=-1)
+        total += 0.5 * np.sum(its.mass * centres + its.inertia * omega**2, axis=-1)
+    return np.asarray(total + 0.5 * np.sum(acting.rotor_inertias(scene) * acting.bends(omega) ** 2, axis=-1))
 
 
 def potential_energy(scene: Scene, theta: FloatArray) -> FloatArray:
@@ -48,25 +54,28 @@ def potential_energy(scene: Scene, theta: FloatArray) -> FloatArray:
 def energy_scale(scene: Scene) -> float:
     """What energy drift is measured against, J. equations.md (E21).
 
-    The full range of the weight's potential, or the energy of motion and springs at the start where that is larger. It
-    is 0 for a chain at rest that nothing pulls at: no energy is at stake there, and a relative drift has no meaning.
+    The full range of the weight's potential, or where one of these is larger, the energy of motion and springs at the
+    start, or what constant torques do in a turn. It is 0 for a chain at rest that nothing pulls at: no energy is at
+    stake there, and a relative drift has no meaning.
     """
     gravity = scene.effects.gravity or 0.0
-    potential_range = 2.0 * gravity * float(dense.hanging_masses(acting.lumped_masses(scene)) @ scene.lengths)
-    springs = float(acting.joint_potential(scene, scene.angles))
-    return max(potential_range, float(kinetic_energy(scene, scene.angles, scene.rates)) + springs)
+    potential_range = 2.0 * gravity * float(np.abs(dense.hanging_masses(acting.lumped_masses(scene))) @ scene.lengths)
+    springs = float(acting.joint_potential(scene.without("joint_torque"), scene.angles))
+    turn = TURN * float(np.abs(np.broadcast_to(scene.effects.joint_torque or 0.0, scene.n)).sum())
+    return max(potential_range, float(kinetic_energy(scene, scene.angles, scene.rates)) + springs, turn)
 
 
 def angular_momentum(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    """Angular momentum about the pivot, (...,) kg m^2/s, counter-clockwise positive. equations.md (E5), (E36).
+    """Angular momentum about the pivot, (...,) kg m^2/s, counter-clockwise positive. (E5), (E53), (E55).
 
     theta: (..., n) rad; omega: (..., n) rad/s. Without gravity it is conserved.
     """
     place = positions(scene.lengths, theta)
     speed = velocities(scene.lengths, theta, omega)
     turning = place[..., 0] * speed[..., 1] - place[..., 1] * speed[..., 0]
-    spinning = acting.rod_inertias(scene) * omega
-    return np.asarray(np.sum(acting.lumped_masses(scene) * turning + spinning, axis=-1))
+    spinning = acting.link_inertias(scene) * omega
+    rotor = acting.rotor_inertias(scene)[0] * omega[..., 0]  # the others turn with one link and against another
+    return np.asarray(np.sum(acting.lumped_masses(scene) * turning + spinning, axis=-1) + rotor)
 
 
 def tensions(scene: Scene, theta: FloatArray, omega: FloatArray) -> FloatArray:

@@ -7,12 +7,12 @@ import math
 import numpy as np
 from scipy.special import ellipj, ellipkm1, elliprf
 
-from pendbench.arrays import FloatArray
-from pendbench.errors import InputError
+from pendbench.base.arrays import FloatArray
+from pendbench.base.errors import InputError
 from pendbench.physics.acting import check_plain
 from pendbench.physics.dense import hanging_masses
 from pendbench.physics.geometry import TURN
-from pendbench.scene import Scene
+from pendbench.scene.scene import Scene
 
 # scipy's am(u) is off by 2e-9 rad at worst (1 - m near 1e-17); Newton's method then needs three rounds for all digits.
 _NEWTON_ROUNDS = 3

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from pendbench.arrays import FloatArray
+from pendbench.base.arrays import FloatArray
 
 TURN: Final = 2.0 * np.pi
 

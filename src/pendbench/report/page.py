@@ -1,44 +1,110 @@
-"""Which page a kind of study has. Adding one is adding its module's name here."""
+"""What a kind of study shows, found in its folder, and the page that is made of it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Protocol, cast
+import dataclasses
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from pendbench.report.columns import Table
+from pendbench.report.names import is_ok
+from pendbench.report.template import render, render_block
+from pendbench.study.kinds import part_of_kind
 
 if TYPE_CHECKING:
     from pendbench.report.plots import Picture
+    from pendbench.study.case import Case
     from pendbench.study.results import Results
 
-#: Kinds of study, each with the module of its page. The others have the plain one.
-PAGES: Final = {
-    "chaos": "pendbench.report.chaos",
-    "cost": "pendbench.report.cost",
-    "stability": "pendbench.report.stability",
-    "scaling": "pendbench.report.scaling",
-    "ensemble": "pendbench.report.ensemble",
-    "effects": "pendbench.report.effects",
-}
 
-_PLAIN: Final = "pendbench.report.plain"
-
-
-class Page(Protocol):
-    """What the module of a page offers. SUMMARY: the columns of the terminal's table."""
+class Columns(Protocol):
+    """What the module `columns` of a kind offers. SUMMARY: the columns of the terminal's table."""
 
     SUMMARY: Sequence[str]
 
-    def answer(self, results: Results) -> str:
-        """The study's answer in two sentences."""
+    def tables(self, results: Results[Any]) -> Sequence[Table]:
+        """Every table of the study; the first has a row for each case."""
 
-    def pictures(self, results: Results) -> Iterator[Picture]:
+
+class Page(Protocol):
+    """What the module `page` of a kind offers, where it has one."""
+
+    def facts(self, results: Results[Any], tables: dict[str, Table]) -> Any:
+        """What the template says, as a dataclass: its fields are the template's names."""
+
+    def pictures(self, results: Results[Any], tables: dict[str, Table]) -> Iterable[Picture]:
         """The study's plots."""
 
-    def markdown_page(self, results: Results, plots: Sequence[Picture]) -> str:
-        """The report."""
+
+class Moving(Protocol):
+    """What the module `page` of a kind offers besides, where something is to be seen moving."""
+
+    def moving(self, results: Results[Any], tables: dict[str, Table]) -> Sequence[Case]:
+        """Cases of one scene to show side by side: of each engine one, its best or the one that is typical of it."""
 
 
-def page(kind: str) -> Page:
-    """The page of a kind of study."""
-    module: Any = import_module(PAGES.get(kind, _PLAIN))
-    return cast(Page, module)
+class Report:
+    """A study's results as people read them. Its parts are made when they are first asked for."""
+
+    def __init__(self, results: Results[Any]) -> None:
+        self.results = results
+        self._columns = cast(Columns, part_of_kind(results.kind, "columns"))
+        self._page = cast("Page | None", part_of_kind(results.kind, "page"))
+
+    @cached_property
+    def tables(self) -> dict[str, Table]:
+        """The tables by name, `cases` first."""
+        return {table.name: table for table in self._columns.tables(self.results)}
+
+    @property
+    def cases(self) -> Table:
+        """The table of cases."""
+        return self.tables["cases"]
+
+    @property
+    def summary(self) -> Sequence[str]:
+        """The columns of `cases` that are worth a glance."""
+        return self._columns.SUMMARY
+
+    @cached_property
+    def pictures(self) -> list[Picture]:
+        """The plots."""
+        return [] if self._page is None else list(self._page.pictures(self.results, self.tables))
+
+    @property
+    def moving(self) -> Sequence[Case]:
+        """The cases that the page shows in motion."""
+        if not hasattr(self._page, "moving"):
+            return ()
+        return cast(Moving, self._page).moving(self.results, self.tables)
+
+    @cached_property
+    def answer(self) -> str:
+        """The study's answer in at most three sentences, plain text on one line."""
+        return render_block(self._template, "answer", self._facts)
+
+    def markdown(self) -> str:
+        """The page."""
+        return render(self._template, self._facts | {"pictures": {plot.name: plot for plot in self.pictures}})
+
+    @property
+    def _template(self) -> str:
+        return "page.md.j2" if self._page is None else f"{self.results.kind}/page.md.j2"
+
+    @cached_property
+    def _facts(self) -> dict[str, Any]:
+        own = None if self._page is None else self._page.facts(self.results, self.tables)
+        told = {} if own is None else {field.name: getattr(own, field.name) for field in dataclasses.fields(own)}
+        return {
+            **self.tables,
+            "title": self.results.title,
+            "quick": self.results.quick,
+            "options": self.results.options,
+            "provenance": self.results.provenance,
+            "scenes": self.tables.get("scenes"),
+            "tables": list(self.tables.values()),
+            "columns": [column.name for column in self.cases.columns],
+            "well": sum(map(is_ok, self.cases)),
+            **told,
+        }

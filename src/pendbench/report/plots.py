@@ -8,7 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
-from pendbench.report.columns import number_text
+from pendbench.report.charts import Chart, chart_of
+from pendbench.report.numbers import number_text
+from pendbench.report.text import label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,32 +21,47 @@ Colour = tuple[float, float, float]
 DPI: Final = 100
 GREY: Final = "0.35"
 
-# Okabe and Ito's colours, which people who confuse red and green tell apart too (jfly.uni-koeln.de/color).
-_HUES: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# Six of Okabe and Ito's colours, which people who confuse red and green tell apart too (jfly.uni-koeln.de/color), and
+# two that are as far from them in all kinds of sight, on white and on black.
+_HUES: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A2BE2", "#853D1F")
+HUES: Final = len(_HUES)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure as a picture, PNG, and as lines that a page draws again, where it has nothing but lines."""
+
+    png: bytes
+    chart: Chart | None = None
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A plot: the name of its file in `plots/`, the scene it is about (or none), its caption, and its bytes."""
+    """A plot: the name of its file in `plots/`, the scene it is about (or none), its caption, and what was drawn."""
 
     name: str
     scene: str
     caption: str
-    png: bytes
+    drawn: Drawn
+
+    @property
+    def png(self) -> bytes:
+        """The picture itself."""
+        return self.drawn.png
 
 
-def draw(figure_of: Callable[[], Figure]) -> bytes:
-    """The PNG of the figure that `figure_of` makes, in the library's own style whatever the user's is."""
+def draw(figure_of: Callable[[], Figure]) -> Drawn:
+    """The figure that `figure_of` makes, in the library's own style whatever the user's is."""
     import matplotlib.style
 
     with matplotlib.style.context("default"):
         figure, file = figure_of(), io.BytesIO()
         figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
-    return file.getvalue()
+        return Drawn(file.getvalue(), chart_of(figure))
 
 
 def hue(index: int) -> str:
-    """The colour of the engine with this place in the study."""
+    """One of the project's colours; `report.styles` says which is whose."""
     return _HUES[index % len(_HUES)]
 
 
@@ -57,6 +74,14 @@ def shades(colour: str, count: int) -> list[Colour]:
         return [base]
     mixes = [-0.5 + 0.95 * i / (count - 1) for i in range(count)]
     return [_mixed(base, 0.0 if mix < 0 else 1.0, abs(mix)) for mix in mixes]
+
+
+def blended(count: int) -> list[str]:
+    """`count` colours (#rrggbb) from blue through pink to vermilion: neighbours look alike, and the ends do not."""
+    from matplotlib.colors import LinearSegmentedColormap, to_hex
+
+    blend = LinearSegmentedColormap.from_list("blend", [_HUES[0], _HUES[3], _HUES[1]])
+    return [to_hex(blend(i / max(1, count - 1))) for i in range(count)]
 
 
 def _mixed(base: Colour, other: float, share: float) -> Colour:
@@ -77,6 +102,18 @@ def panels(count: int, columns: int, width: float, height: float) -> tuple[Figur
     for shown in axes[:count]:
         shown.tick_params(labelbottom=True)
     return figure, axes[:count]
+
+
+def named_panels(
+    names: Sequence[str], title: str, quantity: str, columns: int, width: float, height: float
+) -> tuple[Figure, dict[str, Axes]]:
+    """The same, a panel for each name. quantity: what all their vertical axes show."""
+    figure, axes = panels(len(names), columns, width, height)
+    figure.suptitle(title, fontsize=12)
+    figure.supylabel(quantity, fontsize=10)
+    for name, panel in zip(names, axes, strict=True):
+        panel.set_title(label(name), fontsize=11)
+    return figure, dict(zip(names, axes, strict=True))
 
 
 def logarithmic(axes: Axes, low: float, high: float, which: Literal["x", "y"] = "y") -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
 
-from pendbench.errors import printable
-from pendbench.report.columns import NOTHING, column, shown
-from pendbench.report.page import page
-from pendbench.report.rows import Row, is_ok, method_name, number, records, word
+from pendbench.base.errors import printable
+from pendbench.report import columns as report_columns
+from pendbench.report.columns import Column
+from pendbench.report.names import is_ok, method_name
+from pendbench.report.page import Report
 from pendbench.report.text import clipped
-from pendbench.study.results import Results
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -19,29 +19,30 @@ if TYPE_CHECKING:
 _LONGEST: Final = 28
 
 
-def summary_table(results: Results) -> Table:
+def summary_table(report: Report) -> Table:
     """A row for each case, in the columns that the kind of study finds worth a glance."""
+    return shown_table(report.cases, report.summary, report.results.title)
+
+
+def shown_table(table: report_columns.Table, names: Sequence[str], title: str = "") -> Table:
+    """These columns of a table."""
     from rich.table import Table
 
-    names = [name for name in page(results.kind).SUMMARY if name in results.cases]
-    table = Table(title=_plain(clipped(results.title, 100)), box=None, pad_edge=False, header_style="bold")
-    for name in names:
-        right = bool(column(name).format)
-        table.add_column(column(name).heading, justify="right" if right else "left", no_wrap=name != "flags")
-    for row in records(results.cases):
-        table.add_row(*(_cell(row, name) for name in names), style=None if is_ok(row) else "red")
-    return table
+    columns = [table.column(name) for name in names]
+    shown = Table(title=_plain(clipped(title, 100)) if title else None, box=None, pad_edge=False, header_style="bold")
+    for column in columns:
+        right = "right" if column.format else "left"
+        shown.add_column(column.heading, justify=right, no_wrap=column.name != "flags")  # type: ignore[arg-type]
+    for row in table:
+        shown.add_row(*(_cell(column, row) for column in columns), style=None if is_ok(row) else "red")
+    return shown
 
 
-def _cell(row: Row, name: str) -> Text:
-    if name == "flags":
-        return _plain(", ".join(_short(flag) for flag in word(row, "flags").split("; ") if flag))
-    if name == "method":
-        return _plain(clipped(method_name(row), _LONGEST))
-    if name.startswith("t_") and math.isnan(number(row, name)):
-        missed = number(row, name.removesuffix("_s") + "_not_reached")
-        return _plain(f"> {shown('horizon_s', row.get('horizon_s'))}" if missed > 0 else NOTHING)
-    return _plain(clipped(shown(name, row.get(name)), _LONGEST))
+def _cell(column: Column, row: Any) -> Text:
+    if column.name == "flags":
+        return _plain(", ".join(_short(flag) for flag in column.text(row).split("; ") if flag))
+    text = method_name(row.case) if column.name == "method" else column.text(row)
+    return _plain(clipped(text, _LONGEST))
 
 
 def _short(flag: str) -> str:

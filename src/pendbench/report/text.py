@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
-from pendbench.errors import printable
+from pendbench.base.errors import printable
 
 # What a spreadsheet takes for the beginning of a formula, in the widths in which it can be typed.
 _FORMULA: Final = tuple("=+-@|%\uff1d\uff0b\uff0d\uff20")
@@ -14,18 +14,35 @@ _LONGEST: Final = 240
 _LAST_GLYPH: Final = "\u052f"  # Latin, Greek and Cyrillic: what every copy of the plots' font can draw
 
 
+class Safe(str):
+    """Text that is Markdown already: a template leaves it as it is."""
+
+    __slots__ = ()
+
+
 def clipped(text: str, longest: int = _LONGEST) -> str:
     """The text, and no more than `longest` characters of it."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def markdown(text: Any, longest: int = _LONGEST) -> str:
-    """Any text on one line, such that Markdown shows it and does nothing else with it, in a table as well."""
+def markdown(text: Any, longest: int = _LONGEST) -> Safe:
+    """Any text on one line, such that Markdown shows it and does nothing else with it, in a table as well.
+
+    What is Markdown already stays as it is.
+    """
+    if isinstance(text, Safe):
+        return text
     line = clipped(printable(str(text)), longest)
     line = line.replace("&", "&amp;").replace("\\", "\\\\")
     line = re.sub(r"([`*\[\]|~$#])", r"\\\1", line).replace("<", "&lt;").replace(">", "&gt;")
     line = re.sub(r"(?<![0-9A-Za-z])_|_(?![0-9A-Za-z])", r"\\_", line)  # inside a word it stands for itself
-    return line.replace("://", "\\://").replace("www.", "www\\.")  # no link that nobody meant
+    return Safe(line.replace("://", "\\://").replace("www.", "www\\."))  # no link that nobody meant
+
+
+def code(text: Any, longest: int = _LONGEST) -> Safe:
+    """Any text on one line as Markdown's code, to be copied as it is; as other text where it has backticks itself."""
+    line = clipped(printable(str(text)), longest)
+    return markdown(line) if "`" in line or not line.strip() else Safe(f"`{line}`")
 
 
 def spreadsheet(text: str) -> str:
@@ -52,11 +69,11 @@ def file_name(text: str, taken: Iterable[str] = ()) -> str:
     return name
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[int] = ()) -> str:
+def grid(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[int] = ()) -> Safe:
     """A Markdown table of cells that are safe already. numbers: the columns that are aligned to the right."""
     right = set(numbers)
     rule = ["---:" if i in right else "---" for i in range(len(headings))]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (headings, rule, *rows))
+    return Safe("\n".join("| " + " | ".join(cells) + " |" for cells in (headings, rule, *rows)))
 
 
 def listed(words: Sequence[str], joint: str = "and") -> str:

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pendbench.files import write_whole
-from pendbench.report.page import page
+from pendbench.base.files import write_whole
+from pendbench.report.html_page import html_page
+from pendbench.report.page import Report
 from pendbench.report.sections import provenance_json
+from pendbench.report.stage.records import Stage
 from pendbench.report.tables import csv_text
-from pendbench.report.text import file_name
-from pendbench.study.results import Results
 
 
-def write_report(results: Results, out: Path) -> None:
-    """Write cases.csv, the other tables, plots/, provenance.json and, last, report.md into the folder `out`."""
-    names = {"cases"}
-    _write(out / "cases.csv", csv_text(results.cases).encode())
-    for table, frame in results.tables.items():
-        name = file_name(table, names)
-        names.add(name)
-        _write(out / f"{name}.csv", csv_text(frame).encode())
-    its = page(results.kind)
-    plots = list(its.pictures(results))
-    for plot in plots:
+def write_report(report: Report, out: Path, stage: Stage | None = None) -> None:
+    """Write a CSV file for each table, plots/, provenance.json, report.html and, last, report.md into `out`.
+
+    stage: what moves in report.html.
+    """
+    for table in report.tables.values():
+        _write(out / f"{table.name}.csv", csv_text(table).encode())
+    for plot in report.pictures:
         _write(out / "plots" / f"{plot.name}.png", plot.png)
-    _write(out / "provenance.json", provenance_json(results.provenance).encode())
-    _write(out / "report.md", its.markdown_page(results, plots).encode())
+    _write(out / "provenance.json", provenance_json(report.results.provenance).encode())
+    text = report.markdown()
+    pictures = {f"plots/{plot.name}.png": plot.drawn for plot in report.pictures}
+    _write(out / "report.html", html_page(text, report.answer, pictures, stage).encode())
+    _write(out / "report.md", text.encode())
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import compiled, inlined, part
+from pendbench.solvers.compensated import Sum, add
+from pendbench.solvers.control import (
+    GROW_AT_MOST,
+    Limits,
+    allowed_after,
+    allowed_instead,
+    next_step,
+    step_factor,
+    too_short,
+)
+from pendbench.solvers.dop853 import EmbeddedPair
 from pendbench.solvers.explicit import stage_state
-from pendbench.solvers.outcome import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL, Progress
+from pendbench.solvers.outcome import (
+    DONE,
+    NOT_FINITE,
+    PAUSED,
+    TOO_MANY,
+    TOO_SMALL,
+    Ended,
+    Reached,
+    run_in_parts,
+    steps_at_once,
+)
 from pendbench.solvers.problem import derivative
-from pendbench.solvers.tableaux import EmbeddedPair
-
-#: A first step to try, s. Error control shrinks it where it is too large.
-FIRST_STEP = 1e-3
-
-#: The next step: so much of what error control would allow, and so many times the last one at most and at least.
-SAFETY = 0.9
-GROW_AT_MOST = 5.0
-SHRINK_AT_MOST = 0.2
 
 _EPS = 2.0**-52
 
@@ -29,7 +41,16 @@ _EPS = 2.0**-52
 _ROUNDINGS = 4.0
 
 
-@compiled
+class _Room(NamedTuple):
+    """k (s, d): the stages' derivatives; scale (d,): the error allowed; inner, change (d,): for a while."""
+
+    k: FloatArray
+    scale: FloatArray
+    inner: FloatArray
+    change: FloatArray
+
+
+@part
 def _scaled_error(method: EmbeddedPair, h: float, k: FloatArray, scale: FloatArray) -> float:
     """The largest component of the two error estimates, combined as in Hairer's DOP853, over what is allowed."""
     worst5, worst3 = 0.0, 0.0
@@ -47,111 +68,110 @@ def _scaled_error(method: EmbeddedPair, h: float, k: FloatArray, scale: FloatArr
     return abs(h) * worst5 * worst5 / math.hypot(worst5, 0.1 * worst3)
 
 
-@compiled
-def _rounding_error(
-    system: Any, t: float, h: float, y: FloatArray, k: FloatArray, scale: FloatArray, near: FloatArray, out: FloatArray
-) -> float:
+@part
+def _rounding_error(system: Any, t: float, h: float, y: FloatArray, room: _Room) -> float:
     """The scaled change of y within h (s) where its last digits are others; 0 where that is not finite.
 
-    k (d,): the derivative at y. near and out (d,): room for the other state and its derivative. Neighbours in y, such
-    as the angles of two rods, are moved apart: that changes most.
+    Neighbours in y, such as the angles of two rods, are moved apart: that changes most. Takes the derivative at y from
+    `room.k[0]`.
     """
+    near, out = room.inner, room.change
     for i in range(len(y)):
         near[i] = y[i] + (_EPS if i % 2 else -_EPS) * abs(y[i])
     derivative(system, t, near, out)
     worst = 0.0
     for i in range(len(y)):
-        size = abs(out[i] - k[i]) / scale[i]
+        size = abs(out[i] - room.k[0, i]) / room.scale[i]
         worst = worst if size <= worst else size  # nan is kept
     return abs(h) * worst if worst < np.inf else 0.0
 
 
-@compiled
-def _step_factor(error: float, order: int) -> float:
-    """By how much the step may change after one with this scaled error."""
-    if error == 0.0:
-        return GROW_AT_MOST
-    if not np.isfinite(error):
-        return SHRINK_AT_MOST
-    wanted: float = SAFETY * error ** (-1.0 / order)
-    return min(GROW_AT_MOST, max(SHRINK_AT_MOST, wanted))
+@inlined
+def _all_finite(values: FloatArray) -> bool:
+    """As a loop: numba takes a second to compile `np.all(np.isfinite(values))`."""
+    finite = True
+    for i in range(len(values)):
+        finite = finite and bool(np.isfinite(values[i]))
+    return finite
+
+
+@inlined
+def _add_step(method: EmbeddedPair, h: float, y: Sum, room: _Room) -> None:
+    change = room.change
+    for i in range(len(change)):
+        change[i] = 0.0
+    for s in range(len(method.b)):
+        for i in range(len(change)):
+            change[i] += h * method.b[s] * room.k[s, i]
+    for i in range(len(change)):
+        y.value[i], y.carry[i] = add(y.value[i], y.carry[i], change[i])
+
+
+def integrate(system: Any, method: EmbeddedPair, limits: Limits, t: float, h: float, end: float, y: Sum) -> Reached:
+    """Advance y, in place, from time t to exactly `end` (s) with steps that keep the local error allowed.
+
+    h: the first step to try (s). limits.relative is (d,). Where what the rounding of y makes of a step is more than the
+    error allowed, that is allowed: it falls no faster than the step does, so shorter steps would add up to as much.
+    Gives up at its limits, below the rounding of t, or at a state that is not finite. Only the last step, onto `end`,
+    may be as short as it likes.
+
+    Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.4 (step control) and II.10.
+    """
+    pause = steps_at_once(len(method.b) * len(y.value))
+    tolerance, relative, smallest, most_steps = limits
+
+    def loop(t: float, h: float, left: int) -> Ended:
+        # A group costs Python a microsecond and more, so it passes numbers and arrays.
+        return _integrate(system, method, t, h, end, tolerance, relative, smallest, left, *y, pause)
+
+    return run_in_parts(loop, t, h, most_steps)
 
 
 @compiled
-def _add(y: FloatArray, carry: FloatArray, change: FloatArray) -> None:
-    """Add `change` to y with the rounding errors kept in `carry` (compensated summation, Kahan 1965)."""
-    for i in range(len(y)):
-        small = change[i] + carry[i]
-        total = y[i] + small
-        carry[i] = small - (total - y[i])
-        y[i] = total
-
-
-@compiled
-def integrate(
+def _integrate(
     system: Any,
     method: EmbeddedPair,
     t: float,
-    end: float,
     h: float,
-    y: FloatArray,
-    carry: FloatArray,
+    end: float,
     tolerance: float,
     relative: FloatArray,
     smallest: float,
     most_steps: int,
-) -> Progress:
-    """Advance y (d,), in place, from time t to exactly `end` with steps that keep the local error allowed.
-
-    h: the first step to try (s). carry (d,): what rounding left out of y, kept between calls. relative (d,): the error
-    allowed in y[i] is `tolerance (1 + relative[i] |y[i]|)`, or what the rounding of y makes of a step where that is
-    more: that falls no faster than the step does, so shorter steps would add up to as much. Gives up where it needs a
-    step below `smallest` (s) or below the rounding of t (only the last step, onto `end`, may be as short as it likes),
-    after `most_steps` accepted or rejected, or at a state that is not finite.
-
-    Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.4 (step control) and II.10.
-    """
-    stages, d = len(method.b), len(y)
-    k = np.empty((stages, d))
-    inner, scale, change = np.empty(d), np.empty(d), np.empty(d)
-    accepted, rejected = 0, 0
-    grow = GROW_AT_MOST
-    h = max(h, smallest)
+    value: FloatArray,
+    carry: FloatArray,
+    pause: int,
+) -> Ended:
+    """The same, for `pause` accepted steps at most."""
+    limits, y = Limits(tolerance, relative, smallest, most_steps), Sum(value, carry)
+    stages, d = len(method.b), len(y.value)
+    room = _Room(np.empty((stages, d)), np.empty(d), np.empty(d), np.empty(d))
+    accepted, rejected, most = 0, 0, GROW_AT_MOST
+    h = max(h, limits.smallest)
     while t < end:
-        if accepted + rejected >= most_steps:
-            return Progress(TOO_MANY, t, h, accepted, rejected)
-        left = end - t
-        last = h >= left
-        step = left if last else (0.5 * left if h > 0.5 * left else h)
-        target = end if last else t + step
-        step = target - t  # what rounding makes of it, so that time does not slip
-        if not last and (h < smallest or t + 0.1 * h == t):
-            return Progress(TOO_SMALL, t, h, accepted, rejected)
+        if accepted + rejected >= limits.most_steps:
+            return TOO_MANY, t, h, accepted, rejected
+        if accepted >= pause:  # never after a rejection, which the next step has to know of
+            return PAUSED, t, h, accepted, rejected
+        step = next_step(t, end, h)
+        if not step.last and too_short(t, h, limits.smallest):
+            return TOO_SMALL, t, h, accepted, rejected
         for i in range(d):
-            scale[i] = tolerance * (1.0 + relative[i] * abs(y[i]))
+            room.scale[i] = limits.tolerance * (1.0 + limits.relative[i] * abs(y.value[i]))
         for s in range(stages):
-            stage_state(method.a, s, step, y, k, inner)
-            derivative(system, t + method.c[s] * step, inner, k[s])
-        if not np.all(np.isfinite(k[0])):
-            return Progress(NOT_FINITE, t, h, accepted, rejected)
-        error = _scaled_error(method, step, k, scale)
+            stage_state(method.a, s, step.length, y.value, room.k, room.inner)
+            derivative(system, t + method.c[s] * step.length, room.inner, room.k[s])
+        if not _all_finite(room.k[0]):
+            return NOT_FINITE, t, h, accepted, rejected
+        error = _scaled_error(method, step.length, room.k, room.scale)
         if 1.0 < error < np.inf:
-            rounding = _rounding_error(system, t, step, y, k[0], scale, inner, change)
-            error /= max(1.0, _ROUNDINGS * rounding)
-        factor = _step_factor(error, method.order)
+            error /= max(1.0, _ROUNDINGS * _rounding_error(system, t, step.length, y.value, room))
+        factor = step_factor(error, method.order)
         if error <= 1.0:
-            change[:] = 0.0
-            for s in range(stages):
-                for i in range(d):
-                    change[i] += step * method.b[s] * k[s, i]
-            _add(y, carry, change)
-            t = target
+            _add_step(method, step.length, y, room)
             accepted += 1
-            # A step cut short to land on `end` says little about the next one.
-            h = max(h, step * min(factor, grow)) if last else step * min(factor, grow)
-            grow = GROW_AT_MOST
+            t, h, most = step.target, allowed_after(h, step, min(factor, most)), GROW_AT_MOST
         else:
             rejected += 1
-            grow = 1.0
-            h = step * min(factor, 1.0)
-    return Progress(DONE, t, h, accepted, rejected)
+            h, most = allowed_instead(step, factor), 1.0
+    return DONE, t, h, accepted, rejected

@@ -16,7 +16,7 @@ from numba.core import cgutils as numba_cgutils
 from numba.core import types
 from numba.extending import intrinsic
 
-from pendbench.arrays import FloatArray
+from pendbench.base.arrays import FloatArray
 
 cgutils: Any = numba_cgutils  # has no types
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pendbench.arrays import FloatArray
-from pendbench.compiled import inlined
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import inlined
 
 
 @inlined

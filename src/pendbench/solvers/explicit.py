@@ -1,16 +1,25 @@
-"""Loops with a fixed step: explicit Runge-Kutta methods and semi-implicit Euler."""
+"""The loop with a fixed step for explicit Runge-Kutta methods, and the sums of stages that others use too."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled, inlined
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import compiled, inlined
 from pendbench.solvers.copying import copy
-from pendbench.solvers.problem import acceleration, derivative
-from pendbench.solvers.tableaux import Tableau
+from pendbench.solvers.methods import FixedStep, Form
+from pendbench.solvers.problem import derivative
+
+
+class Tableau(NamedTuple):
+    """An explicit Runge-Kutta method: a (s, s) strictly lower triangular, b (s,), c (s,), and its order."""
+
+    a: FloatArray
+    b: FloatArray
+    c: FloatArray
+    order: int
 
 
 @inlined
@@ -40,8 +49,8 @@ def add_stages(weights: FloatArray, stages: int, h: float, k: FloatArray, out: F
 
 
 @compiled
-def runge_kutta(system: Any, method: Tableau, first: int, dt: float, y: FloatArray, steps: int) -> None:
-    """Take the steps from number `first` on, each of `dt`, the one with number 0 at time 0; y (d,) in place."""
+def runge_kutta(system: Any, method: Tableau, y: FloatArray, first: int, dt: float, steps: int) -> None:
+    """Take steps as `methods.FixedStep` says; y (d,) in place."""
     stages, d = len(method.b), len(y)
     k = np.empty((stages, d))
     inner = np.empty(d)
@@ -56,16 +65,24 @@ def runge_kutta(system: Any, method: Tableau, first: int, dt: float, y: FloatArr
                 y[i] += weight * k[s, i]
 
 
-@compiled
-def semi_implicit_euler(system: Any, first: int, dt: float, q: FloatArray, v: FloatArray, steps: int) -> None:
-    """Take steps of `dt` as `runge_kutta` does: first the rates v (d,), then with them q (d,), both in place.
+class _State(NamedTuple):
+    """y (2 d,), and the two halves of it."""
 
-    Symplectic for a Hamiltonian whose force does not depend on v; a chain's does, so here it is of order 1 and no more
-    (Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1.2).
-    """
-    a = np.empty_like(q)
-    for step in range(steps):
-        acceleration(system, (first + step) * dt, q, v, a)
-        for i in range(len(q)):
-            v[i] += dt * a[i]
-            q[i] += dt * v[i]
+    y: FloatArray
+    q: FloatArray
+    v: FloatArray
+
+
+def _begin(q: FloatArray, v: FloatArray) -> _State:
+    y = np.concatenate([q, v])
+    return _State(y, *np.split(y, 2))
+
+
+def runge_kutta_method(name: str, tableau: Tableau, note: str) -> FixedStep:
+    """The method with these coefficients."""
+
+    def advance(system: Any, state: _State, first: int, dt: float, steps: int) -> int:
+        runge_kutta(system, tableau, state.y, first, dt, steps)
+        return steps
+
+    return FixedStep(name, tableau.order, note, Form.RATES, _begin, advance)

@@ -21,14 +21,15 @@ VIII.1.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled, inlined
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import compiled
 from pendbench.solvers.copying import copy, copy_rows
-from pendbench.solvers.rattle import Rods, accept_step, try_step
+from pendbench.solvers.methods import FixedStep, Form, add
+from pendbench.solvers.rattle import Ends, Rods, ends_at, take_steps
 
 #: A frame that asks for more steps than this is given up.
 MOST_SUBSTEPS = 4096
@@ -37,82 +38,76 @@ MOST_SUBSTEPS = 4096
 LONGEST = 0.4
 
 
-class Progress(NamedTuple):
-    """How many frames were taken, and in how many steps the last was cut."""
+class _State(NamedTuple):
+    """What `rattle.Ends` has, and substeps (1,): in how many steps the last frame was cut."""
 
-    frames: int
-    substeps: int
-
-
-@inlined
-def quickness(masses: FloatArray, forces: FloatArray) -> float:
-    """(h W)^2 of the step whose multipliers were forces (n,), -h^2 T / (2 l) kg; nan where one of them is.
-
-    masses (n,) kg; W is the bound on the chain's frequencies above.
-    """
-    most, n = 0.0, len(masses)
-    for i in range(n):
-        outer = abs(forces[i + 1]) if i + 1 < n else 0.0
-        squared = 4.0 * (abs(forces[i]) + outer) / masses[i]
-        if not squared <= most:  # so that nan counts
-            most = squared
-    return most
+    points: FloatArray
+    speeds: FloatArray
+    forces: FloatArray
+    turns: FloatArray
+    substeps: Any
 
 
-@inlined
-def _cross(
-    rods: Rods,
-    h: float,
-    points: FloatArray,
-    speeds: FloatArray,
-    forces: FloatArray,
-    turns: FloatArray,
-    new_points: FloatArray,
-    new_speeds: FloatArray,
-    steps: int,
-) -> bool:
-    """Take the steps of one frame; False at the first that is too long."""
-    for _ in range(steps):
-        if not try_step(rods, h, points, speeds, forces, new_points, new_speeds):
-            return False
-        if not quickness(rods.masses, forces) <= LONGEST**2:
-            return False
-        accept_step(rods, points, speeds, turns, new_points, new_speeds)
-    return True
+def begin(points: FloatArray, speeds: FloatArray) -> _State:
+    """The state at the start, copied."""
+    return _State(*ends_at(points, speeds)[:4], np.ones(1, np.int64))
 
 
 @compiled
-def advance(
+def _copy_ends(source: Ends, target: Ends) -> None:
+    copy_rows(source.points, target.points)
+    copy_rows(source.speeds, target.speeds)
+    copy(source.forces, target.forces)
+    copy(source.turns, target.turns)
+
+
+@compiled
+def _advance(
     rods: Rods,
-    frame: float,
-    substeps: int,
     points: FloatArray,
     speeds: FloatArray,
     forces: FloatArray,
     turns: FloatArray,
+    substeps: Any,
+    frame: float,
     frames: int,
-) -> Progress:
-    """Take frames of `frame` (s) in `substeps` steps each, or in twice as many as often as it takes.
+) -> int:
+    """Take frames of `frame` (s) in `substeps[0]` steps each, or in twice as many as often as it takes.
 
-    points (n, 2) m, speeds (n, 2) m/s, forces (n,) and turns (n,) are those of `rattle.rattle`, changed in place.
-    Stops at the start of the first frame that would need more than MOST_SUBSTEPS steps.
+    Stops at the start of the first frame that would need more than MOST_SUBSTEPS steps, and returns how many it took.
     """
-    new_points, new_speeds = np.empty_like(points), np.empty_like(speeds)
-    kept_points, kept_speeds = np.empty_like(points), np.empty_like(speeds)
-    kept_forces, kept_turns = np.empty_like(forces), np.empty_like(turns)
+    ends = Ends(points, speeds, forces, turns, np.empty_like(points), np.empty_like(speeds))
+    kept = Ends(
+        np.empty_like(points), np.empty_like(speeds), np.empty_like(forces), np.empty_like(turns), points, speeds
+    )
     for taken in range(frames):
-        copy_rows(points, kept_points)
-        copy_rows(speeds, kept_speeds)
-        copy(forces, kept_forces)
-        copy(turns, kept_turns)
-        while not _cross(rods, frame / substeps, points, speeds, forces, turns, new_points, new_speeds, substeps):
-            copy_rows(kept_points, points)
-            copy_rows(kept_speeds, speeds)
-            copy(kept_turns, turns)
-            if 2 * substeps > MOST_SUBSTEPS:
-                return Progress(taken, substeps)
-            substeps *= 2
-            for i in range(len(forces)):
-                kept_forces[i] *= 0.25  # multipliers go with the square of the step
-                forces[i] = kept_forces[i]
-    return Progress(frames, substeps)
+        _copy_ends(ends, kept)
+        while take_steps(rods, ends, frame / substeps[0], substeps[0], LONGEST**2) < substeps[0]:
+            for i in range(len(kept.forces)):
+                kept.forces[i] *= 0.25  # multipliers go with the square of the step
+            _copy_ends(kept, ends)
+            if 2 * substeps[0] > MOST_SUBSTEPS:
+                return taken
+            substeps[0] *= 2
+    return frames
+
+
+def take_frames(rods: Rods, state: _State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
+    """Take steps as `methods.FixedStep` says, each a frame."""
+    taken: int = _advance(rods, *state, dt, steps)
+    return taken
+
+
+add(
+    FixedStep(
+        "frame",
+        order=2,
+        note="RATTLE in as many equal steps as needed",
+        form=Form.ENDS,
+        begin=begin,
+        advance=take_frames,
+        stuck=f"the chain moves too fast for {MOST_SUBSTEPS} steps in a frame",
+        remedy="a shorter frame would do",
+        substeps=True,
+    )
+)

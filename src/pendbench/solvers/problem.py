@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pendbench.arrays import FloatArray
+from pendbench.base.arrays import FloatArray
 
 
 def derivative(system: Any, t: float, y: FloatArray, dy: FloatArray) -> None:
@@ -41,6 +41,6 @@ def rate_series(system: Any, t: float, q: FloatArray, v: FloatArray) -> None:
     raise NotImplementedError(f"no series for {type(system).__name__}")
 
 
-def derivatives_of_many(system: Any, y: FloatArray, dy: FloatArray) -> None:
+def ensemble_derivatives(system: Any, y: FloatArray, dy: FloatArray) -> None:
     """Write dy/dt (d, lanes) of many states y (d, lanes) side by side into dy; the system must not depend on time."""
-    raise NotImplementedError(f"no derivatives of many for {type(system).__name__}")
+    raise NotImplementedError(f"no derivatives of an ensemble for {type(system).__name__}")

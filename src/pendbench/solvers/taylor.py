@@ -10,13 +10,25 @@ Experimental Mathematics 14 (2005), 99.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pendbench.arrays import FloatArray
-from pendbench.compiled import compiled, inlined
-from pendbench.solvers.outcome import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL, Progress
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import compiled, inlined
+from pendbench.solvers.compensated import add
+from pendbench.solvers.control import Limits, too_short
+from pendbench.solvers.outcome import (
+    DONE,
+    NOT_FINITE,
+    PAUSED,
+    TOO_MANY,
+    TOO_SMALL,
+    Ended,
+    Reached,
+    run_in_parts,
+    steps_at_once,
+)
 from pendbench.solvers.problem import rate_series
 
 #: A series' step before the series is known: none yet.
@@ -25,6 +37,25 @@ NO_STEP = -1.0
 # The last orders that say how far a series holds. In a motion that time reversal or a reflection leaves as it is, three
 # of four orders in a row can be zero.
 _LAST_ORDERS = 4
+
+
+class Series(NamedTuple):
+    """A state and how it goes on.
+
+    q (d,) and v[0] (d,): the state where the series begins; v (order + 1, d): the Taylor coefficients of the rates
+    there; carry (2, d): what rounding left out of q and v[0].
+    """
+
+    q: FloatArray
+    v: FloatArray
+    carry: FloatArray
+
+
+def series_from(q: FloatArray, v: FloatArray, order: int) -> Series:
+    """The state q (d,), v (d,), copied, with room for a series of that order."""
+    series = Series(q.copy(), np.zeros((order + 1, len(q))), np.zeros((2, len(q))))
+    series.v[0] = v
+    return series
 
 
 def order_for(tolerance: float) -> int:
@@ -83,64 +114,76 @@ def _changes(v: FloatArray, i: int, h: float, shares: FloatArray) -> tuple[float
     return (q_change * h + v[0, i]) * h, v_change * h
 
 
-@inlined
-def _add(value: float, carry: float, change: float) -> tuple[float, float]:
-    """Value + change, and what rounding left out of it (compensated summation, Kahan 1965)."""
-    small = change + carry
-    total = value + small
-    return total, small - (total - value)
+def integrate(system: Any, limits: Limits, t: float, h: float, end: float, series: Series) -> Reached:
+    """Take steps until the series that begins at the time reached holds up to `end` (s).
+
+    t and h: where the last series began and how long it holds; h is `NO_STEP` before the first. The series is changed
+    in place. The local error allowed is `tolerance` in q and `tolerance (1 + relative |v|)` in v, where
+    `limits.relative` is one number. Gives up where a series holds for less than the smallest step or than the rounding
+    of t, after `most_steps` series, or at one that is not finite. `state_at` gives the state at `end`.
+    """
+    pause = steps_at_once(len(series.v) ** 2 * len(series.q))
+    tolerance, relative, smallest, most_steps = limits
+
+    def loop(t: float, h: float, left: int) -> Ended:
+        # A group costs Python a microsecond and more, so it passes numbers and arrays.
+        return _integrate(system, t, h, end, tolerance, relative, smallest, left, *series, pause)
+
+    return run_in_parts(loop, t, h, most_steps)
 
 
 @compiled
-def integrate(
+def _integrate(
     system: Any,
     t: float,
     h: float,
     end: float,
-    q: FloatArray,
-    v: FloatArray,
-    carry: FloatArray,
     tolerance: float,
     relative: float,
     smallest: float,
     most_steps: int,
-) -> Progress:
-    """Take steps until the series that begins at the time reached holds up to `end` (s).
-
-    t and h: where the last series began and how long it holds; h is `NO_STEP` before the first. q (d,) and v[0] (d,):
-    the state at t; v (order + 1, d): the series of the rates there; carry (2, d): what rounding left out of q and v[0].
-    All are changed in place. The local error allowed is `tolerance` in q and `tolerance (1 + relative |v|)` in v. Gives
-    up where a series holds for less than `smallest` (s) or than the rounding of t, after `most_steps` series, or at one
-    that is not finite. `state_at` gives the state at `end`.
-    """
+    q: FloatArray,
+    v: FloatArray,
+    carry: FloatArray,
+    pause: int,
+) -> Ended:
+    """The same, for `pause` series at most."""
     shares = _shares(len(v))
     allowed = math.log(tolerance) / len(v)
     taken = 0
     while True:
         if h == NO_STEP:
             if taken >= most_steps:
-                return Progress(TOO_MANY, t, h, taken, 0)
+                return TOO_MANY, t, h, taken, 0
+            if taken >= pause:
+                return PAUSED, t, h, taken, 0
             rate_series(system, t, q, v)
             taken += 1
             h = _reach(v, allowed, relative)
         if not h >= 0.0:
-            return Progress(NOT_FINITE, t, h, taken, 0)
+            return NOT_FINITE, t, h, taken, 0
         if t + h >= end:
-            return Progress(DONE, t, h, taken, 0)
-        if h < smallest or t + 0.1 * h == t:
-            return Progress(TOO_SMALL, t, h, taken, 0)
+            return DONE, t, h, taken, 0
+        if too_short(t, h, smallest):
+            return TOO_SMALL, t, h, taken, 0
         target = t + h
         step = target - t  # what rounding makes of it, so that time does not slip
         for i in range(len(q)):
             q_change, v_change = _changes(v, i, step, shares)
-            q[i], carry[0, i] = _add(q[i], carry[0, i], q_change)
-            v[0, i], carry[1, i] = _add(v[0, i], carry[1, i], v_change)
+            q[i], carry[0, i] = add(q[i], carry[0, i], q_change)
+            v[0, i], carry[1, i] = add(v[0, i], carry[1, i], v_change)
         t, h = target, NO_STEP
 
 
-@compiled
-def state_at(h: float, q: FloatArray, v: FloatArray, carry: FloatArray, q_then: FloatArray, v_then: FloatArray) -> None:
+def state_at(h: float, series: Series, q_then: FloatArray, v_then: FloatArray) -> None:
     """Write the state h (s) after the series began into q_then (d,), v_then (d,)."""
+    _state_at(h, *series, q_then, v_then)
+
+
+@compiled
+def _state_at(
+    h: float, q: FloatArray, v: FloatArray, carry: FloatArray, q_then: FloatArray, v_then: FloatArray
+) -> None:
     shares = _shares(len(v))
     for i in range(len(q)):
         q_change, v_change = _changes(v, i, h, shares)

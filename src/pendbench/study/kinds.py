@@ -1,39 +1,42 @@
-"""The kinds of study. A kind is a module of this package; adding one is adding its name here."""
+"""The kinds of study: each is a folder of `pendbench.kinds`, and there is no list of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol, cast
 
 if TYPE_CHECKING:
-    from pendbench.study.plan import Plan, StudyFile
-    from pendbench.study.results import Results
-    from pendbench.study.runner import Runner
+    from pendbench.execution.runner import Runner
+    from pendbench.study.plan import Plan
+    from pendbench.study.study_file import StudyFile
 
-#: The kinds whose measures hold with effects beside gravity; the others count on energy being conserved.
-WITH_EFFECTS: Final = frozenset({"effects"})
-
-#: Names of kinds, each with its module.
-KINDS: Final = {
-    "chaos": "pendbench.study.chaos",
-    "cost": "pendbench.study.cost",
-    "stability": "pendbench.study.stability",
-    "ensemble": "pendbench.study.ensemble",
-    "scaling": "pendbench.study.scaling",
-    "effects": "pendbench.study.effects",
-}
+_ROOM: Final = Path(__file__).resolve().parents[1] / "kinds"
 
 
 class Kind(Protocol):
-    """What a kind's module offers."""
+    """What a kind's module `study` offers."""
 
     Options: type[StudyFile]
     check: Callable[[Plan], None]  # raises InputError, one line, for what only the kind can see
-    run: Callable[[Plan, Runner], Results]
+    measure: Callable[[Plan, Runner], Any]  # what it found, typed by the kind
+
+
+@cache
+def kinds() -> tuple[str, ...]:
+    """The names of all kinds, sorted."""
+    return tuple(sorted(file.parent.name for file in _ROOM.glob("*/study.py")))
+
+
+def part_of_kind(name: str, part: str) -> Any:
+    """The module `part` of a kind's folder; None where it has none."""
+    module = ".".join(("pendbench", _ROOM.name, name, part))
+    return import_module(module) if name in kinds() and find_spec(module) else None
 
 
 def kind(name: str) -> Kind:
-    """The module of a kind."""
-    module: Any = import_module(KINDS[name])
-    return cast(Kind, module)
+    """What a kind studies and how."""
+    return cast(Kind, part_of_kind(name, "study"))

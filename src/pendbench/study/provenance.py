@@ -8,22 +8,13 @@ from importlib import metadata
 from typing import Any
 
 from pendbench import __version__
-from pendbench.source import source_digest
+from pendbench.base.processes import processor
+from pendbench.base.source import source_digest
 from pendbench.study.ask import version
 from pendbench.study.plan import Plan
 
 _LIBRARIES = ("numpy", "scipy", "numba", "pandas")
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-
-
-def processor() -> str:
-    """The name of this machine's processor."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
-        return names[0] if names else platform.processor()
-    except OSError:
-        return platform.processor()
 
 
 def provenance(plan: Plan, workers: int) -> dict[str, Any]:
@@ -44,6 +35,7 @@ def provenance(plan: Plan, workers: int) -> dict[str, Any]:
         **{name: os.environ.get(name, "not set") for name in _THREAD_VARIABLES},
         "seed": getattr(plan.options, "seed", None),
         "study": plan.name,
+        "kind": plan.options.kind,
         "study content": plan.digest,
         "quick": plan.quick,
         **{f"scene {scene.name}": scene.digest for scene in plan.scenes},

@@ -1,27 +1,27 @@
-"""What a study found: tables for people and programs. The report knows this and nothing else."""
+"""What a study found."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
-import pandas as pd
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
-class Results:
-    """title, name, kind: of the study. cases: one row per case, in the columns of `report.columns`.
-
-    tables: other tables by name (`scenes`, `causes`, `starts`, `curves`, ...). provenance: what the numbers come from.
-    quick: whether it was the quick variant.
+class Results(Generic[Found]):
+    """title, name, kind: of the study. found: what its kind measured, typed by the kind. options: the study's keys,
+    checked. provenance: what the numbers come from. quick: whether it was the quick variant. kept: how many of how many
+    results were there from an earlier run. unused: how many others the folder had, where none of them could be used.
     """
 
     name: str
     title: str
     kind: str
-    cases: pd.DataFrame
-    tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    found: Found
+    options: Any = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    options: Mapping[str, Any] = field(default_factory=dict)
     quick: bool = False
+    kept: tuple[int, int] = (0, 0)
+    unused: int = 0

@@ -1,0 +1,20 @@
+"""The type of the project's arrays, and what stands for nothing in them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def no_numbers() -> FloatArray:
+    """The array (0,) of a record in which nothing was found."""
+    return np.zeros(0)
+
+
+def largest(values: FloatArray) -> float:
+    """The largest of some numbers; nan where there are none."""
+    return float(values.max()) if len(values) else math.nan

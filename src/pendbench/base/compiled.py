@@ -1,0 +1,229 @@
+"""How the project compiles its kernels: one decorator, one cache on disk.
+
+numba looks only at the file of the outermost function to decide whether a cached kernel is stale, but our solvers have
+the equations of motion compiled into them. So each file of kernels has a folder in the cache that is named after a hash
+of all sources that its kernels can hold. A kernel reaches what it holds in two ways: by a name, so through the imports
+of its file; or by the type of an argument (`chosen_by_type`, `specialise`), from a file that it need not know. The
+first differ from file to file, the second are in every hash: an edited solver leaves the kernels of the others alone,
+and edited physics leaves none.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import inspect
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core import config as numba_config
+from numba.core.registry import CPUDispatcher
+from numba.extending import overload
+
+config: Any = numba_config  # its attributes are set while it is imported
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_KERNEL_SOURCES = ("base/compiled.py", "effects/*.py", "physics/**/*.py", "solvers/**/*.py")
+
+#: Division by zero gives inf or nan, as in numpy: a test before each division would cost time and catch nothing.
+#: A product and a sum may be rounded once instead of twice.
+_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
+
+#: Such a kernel cannot be called but by others: what Python would need is a tenth of the time to compile it.
+_PART: Any = {**_OPTIONS, "no_cpython_wrapper": True}
+_INLINED: Any = {**_PART, "forceinline": True}
+
+_IMPORT = re.compile(r"^[ \t]*(?:from|import)[ \t]+([\w.]+)(?=(.*?)(?:\n[ \t]*\n|\Z))", re.DOTALL | re.MULTILINE)
+_WORD = re.compile(r"\w+")
+#: What gives kernels to others by type.
+_BY_TYPE = re.compile(r"\b(?:chosen_by_type|specialise)\b")
+
+_kernels: list[Any] = []
+_sources_outside: list[Path] = []
+
+
+def cache_name(source: Path) -> str:
+    """The name of the folder with the machine code of the kernels in that file."""
+    return f"{source.stem}-{_digest(source, tuple(_sources_outside))}"
+
+
+@cache
+def _inside() -> dict[str, Path]:
+    """The sources of kernels in the package, by the names of their modules."""
+    found = {path for pattern in _KERNEL_SOURCES for path in _PACKAGE.glob(pattern)}
+    names = {path: ".".join((_PACKAGE.name, *path.relative_to(_PACKAGE).with_suffix("").parts)) for path in found}
+    return {names[path].removesuffix(".__init__"): path for path in sorted(found)}
+
+
+@cache
+def _imported(source: Path) -> frozenset[Path]:
+    """The sources of kernels that a source imports, anywhere in it, and the packages that they are in.
+
+    Rather too many: whatever stands between an import and the next empty line may be a name that it imports. To parse
+    all sources would take every process a quarter of a second.
+    """
+    found = set()
+    for module, block in _IMPORT.findall(source.read_text("utf-8")):
+        parts = module.split(".")
+        found |= {".".join(parts[:end]) for end in range(1, len(parts) + 1)}
+        found |= {f"{module}.{word}" for word in _WORD.findall(block)}
+    return frozenset(path for name, path in _inside().items() if name in found)
+
+
+def _with_imports(sources: Iterable[Path]) -> set[Path]:
+    found, left = set(), set(sources)
+    while left:
+        found |= left
+        left = set().union(*map(_imported, left)) - found
+    return found
+
+
+@cache
+def _arriving_by_type() -> frozenset[Path]:
+    """The sources of what any kernel may hold without knowing it."""
+    return frozenset(_with_imports(path for path in _inside().values() if _BY_TYPE.search(path.read_text("utf-8"))))
+
+
+def sources_of(source: Path) -> set[Path]:
+    """The sources in the package of all that kernels in this file can hold: all there are for a file outside it."""
+    inside = set(_inside().values())
+    if source not in inside:
+        return inside
+    return _with_imports({source, _PACKAGE / "base/compiled.py"}) | _arriving_by_type()
+
+
+@cache
+def _digest(source: Path, outside: tuple[Path, ...]) -> str:
+    digest = hashlib.sha256(f"numba {numba.__version__}".encode())
+    for path in (*sorted(sources_of(source)), *outside):
+        # What was typed at a prompt has no file to compare: nothing that was compiled before is used for it.
+        digest.update(path.read_bytes() if path.is_file() else os.urandom(16))
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _home() -> Path:
+    """A folder below NUMBA_CACHE_DIR or the user's cache; where that cannot be, one for this process only."""
+    try:
+        home = Path(config.CACHE_DIR or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "pendbench"
+        home.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=home).close()
+    except (OSError, RuntimeError):  # RuntimeError: this user has no home
+        home = Path(tempfile.mkdtemp(prefix="pendbench-kernels-"))
+        atexit.register(shutil.rmtree, home, ignore_errors=True)
+    return home
+
+
+def _keep_on_disk(kernel: Any) -> None:
+    folder, before = _home() / cache_name(_source(kernel)), config.CACHE_DIR
+    config.CACHE_DIR = str(folder)
+    try:
+        kernel.enable_caching()
+    finally:
+        config.CACHE_DIR = before
+
+
+def _source(function: Any) -> Path:
+    return Path(inspect.getfile(inspect.unwrap(function))).resolve()
+
+
+def compiled(function: Kernel) -> Kernel:
+    """Compile `function` when it is first called, and keep the machine code on disk."""
+    return _compiled(function, _OPTIONS)
+
+
+def compiled_for_threads(function: Kernel) -> Kernel:
+    """The same for a kernel beside which other threads of Python run."""
+    return _compiled(function, {**_OPTIONS, "nogil": True})
+
+
+def inlined(function: Kernel) -> Kernel:
+    """The same for a small kernel that is made part of whatever calls it: passing arrays costs as much as it does."""
+    return _part(function, _INLINED, _Inlined)
+
+
+def part(function: Kernel) -> Kernel:
+    """The same for a kernel of any size that only others call."""
+    return _part(function, _PART, _Part)
+
+
+def as_written(function: Kernel) -> Kernel:
+    """The same for a kernel that lives by its rounding errors: every operation is rounded, and for itself."""
+    return _compiled(function, {**_OPTIONS, "fastmath": False})
+
+
+def part_as_written(function: Kernel) -> Kernel:
+    """The same for one that only others call."""
+    return _part(function, {**_PART, "fastmath": False}, _Part)
+
+
+class _Part(CPUDispatcher):
+    """A kernel that only others can call: without what Python would need, numba would end the process."""
+
+    def __call__(self, *_: Any) -> Any:
+        raise TypeError(f"{self.py_func.__name__} is compiled into other kernels; allowed: a call in one of them")
+
+
+class _Inlined(_Part):
+    """One that becomes part of them."""
+
+
+def _part(function: Kernel, options: Any, its: type[_Part]) -> Kernel:
+    kernel: Any = _compiled(function, options)
+    kernel.__class__ = its
+    return cast(Kernel, kernel)
+
+
+def _compiled(function: Kernel, options: Any) -> Kernel:
+    kernel: Kernel = numba.njit(**options)(function)
+    _keep_on_disk(kernel)
+    _kernels.append(kernel)
+    return kernel
+
+
+def specialise(generic: Callable[..., None], system: type, kernel: Callable[..., None]) -> None:
+    """Have `generic(s, *rest)`, called in a kernel, be `kernel(s, *rest)` where s is of the NamedTuple class `system`.
+
+    The choice is made while compiling, by the type of s.
+    """
+    _know_source(_source(kernel))
+
+    def choose(s: Any, *rest: Any) -> Callable[..., None] | None:  # noqa: ARG001
+        if getattr(s, "instance_class", None) is not system:
+            return None
+        # Inlined as it is: a call in between would cost a third of a second, for each type that it is compiled for.
+        return kernel.py_func if isinstance(kernel, _Inlined) else call
+
+    def call(s: Any, *rest: Any) -> None:
+        kernel(s, *rest)
+
+    chosen_by_type(generic)(choose)
+
+
+def chosen_by_type(generic: Callable[..., Any]) -> Callable[[Kernel], Kernel]:
+    """Have a kernel that calls `generic` call what the decorated function returns for its arguments' types.
+
+    That is a function of the same arguments, or None where the types are not its own.
+    """
+    return overload(generic, jit_options=_INLINED, strict=False)
+
+
+def _know_source(source: Path) -> None:
+    """Give a process that has a system from outside the package a cache of its own.
+
+    In the common one nobody would notice that kernels for that system are stale, and the name of its type would keep
+    every process that cannot import it from reading the cache at all.
+    """
+    if _PACKAGE in source.parents or source in _sources_outside:
+        return
+    _sources_outside.append(source)
+    for kernel in _kernels:
+        _keep_on_disk(kernel)

@@ -1,0 +1,195 @@
+"""The runs of the analytic engine: each holds a state and advances it with one of our solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+from pendbench.base.arrays import FloatArray
+from pendbench.base.faults import Fault
+from pendbench.engines.protocol import State
+from pendbench.physics.acting import check_plain
+from pendbench.physics.geometry import positions, velocities
+from pendbench.physics.kernels.table import momenta_of, rates_of, series_system_of, system_of
+from pendbench.scene.scene import Scene
+from pendbench.solvers import adaptive, control, outcome, taylor
+from pendbench.solvers.compensated import sum_from
+from pendbench.solvers.dop853 import DOP853
+from pendbench.solvers.methods import FixedStep, Form
+from pendbench.solvers.rattle import rods_of
+
+
+def _finite(*arrays: FloatArray) -> Fault | None:
+    if all(np.all(np.isfinite(array)) for array in arrays):
+        return None
+    return Fault("not finite", "an angle or a rate is not finite")
+
+
+def _given_up(how: int, t: float) -> Fault | None:
+    if how not in outcome.REASONS:
+        return None
+    status, reason = outcome.REASONS[how]
+    return Fault(status, f"{reason} at t = {t:.6g} s")
+
+
+class _Rates:
+    """Angles and rates, as a method of that form advances them."""
+
+    def __init__(self, scene: Scene, method: FixedStep) -> None:
+        self.system, self.state = system_of(scene), method.begin(scene.angles, scene.rates)
+
+    def now(self, taken: int) -> State:  # noqa: ARG002
+        return State(self.state.q.copy(), self.state.v.copy())
+
+
+class _Momenta:
+    """Angles and momenta."""
+
+    def __init__(self, scene: Scene, method: FixedStep) -> None:
+        self.system, momenta = system_of(scene), np.empty(scene.n)
+        self._rates = scene.rates.copy()
+        momenta_of(self.system, scene.angles.copy(), self._rates, momenta)
+        self.state = method.begin(scene.angles, momenta, scene.rates)
+
+    def now(self, taken: int) -> State:
+        if taken:
+            rates_of(self.system, self.state.q, self.state.p, self._rates)
+        return State(self.state.q.copy(), self._rates.copy())
+
+
+class _Ends:
+    """The rods' ends in the plane, and what they say of angles and rates."""
+
+    def __init__(self, scene: Scene, method: FixedStep) -> None:
+        check_plain(scene, "RATTLE")
+        self.system = rods_of(scene.masses, scene.lengths, scene.effects.gravity or 0.0)
+        points = positions(scene.lengths, scene.angles)
+        self.state = method.begin(points, velocities(scene.lengths, scene.angles, scene.rates))
+        self._start = State(scene.angles.copy(), scene.rates.copy())
+        self.state.turns[:] = np.round((scene.angles - self._directions()) / (2 * np.pi))
+
+    def _rods_now(self) -> FloatArray:
+        return np.diff(self.state.points, axis=0, prepend=np.zeros((1, 2)))
+
+    def _directions(self) -> FloatArray:
+        rods = self._rods_now()
+        return np.arctan2(rods[:, 0], -rods[:, 1])
+
+    def now(self, taken: int) -> State:
+        """Also how far the worst rod is from its length."""
+        if taken == 0:
+            return State(self._start.theta.copy(), self._start.omega.copy())
+        theta = self._directions() + 2 * np.pi * self.state.turns
+        relative = np.diff(self.state.speeds, axis=0, prepend=np.zeros((1, 2)))
+        omega = (np.cos(theta) * relative[:, 0] + np.sin(theta) * relative[:, 1]) / self.system.lengths
+        gap = np.abs(np.hypot(*self._rods_now().T) / self.system.lengths - 1).max()
+        return State(theta, omega, float(gap))
+
+
+class _Variables(Protocol):
+    """A system, its state as a solver keeps it, and what that says after so many steps."""
+
+    system: Any
+    state: Any
+
+    def now(self, taken: int) -> State: ...
+
+
+_VARIABLES: Final[Mapping[Form, Callable[[Scene, FixedStep], _Variables]]] = {
+    Form.RATES: _Rates,
+    Form.MOMENTA: _Momenta,
+    Form.ENDS: _Ends,
+}
+
+
+class FixedRun:
+    """A method with a fixed step, in the variables of its form."""
+
+    def __init__(self, scene: Scene, method: FixedStep, dt: float) -> None:
+        self._method, self._dt, self._taken, self._stuck = method, dt, 0, False
+        self._variables = _VARIABLES[method.form](scene, method)
+
+    def advance(self, steps: int) -> None:
+        """Take `steps` steps, or as many as can be taken."""
+        if self._stuck:
+            return
+        its = self._variables
+        taken = self._method.advance(its.system, its.state, self._taken, self._dt, steps)
+        self._taken += taken
+        self._stuck = taken < steps
+
+    def state(self) -> State:
+        """The state now."""
+        return self._variables.now(self._taken)
+
+    def health(self) -> Fault | None:
+        """Whether it is finite, and whether all steps could be taken."""
+        if self._stuck:
+            where = f"at t = {self._taken * self._dt:.6g} s"
+            return Fault("not converged", f"{self._method.stuck} {where}; {self._method.remedy}")
+        return _finite(*self.state()[:2])
+
+
+def _limits(settings: Mapping[str, Any], relative: Any) -> control.Limits:
+    smallest, most_steps = float(settings["smallest_step"]), int(settings["most_steps"])
+    return control.Limits(float(settings["tolerance"]), relative, smallest, most_steps)
+
+
+class Adaptive:
+    """An embedded pair with error control and compensated summation. begin: the time of the scene's start, s."""
+
+    def __init__(self, scene: Scene, settings: Mapping[str, Any], begin: float = 0.0) -> None:
+        self._system, self._t = system_of(scene), begin
+        self._y = sum_from(np.concatenate([scene.angles, scene.rates]))
+        # Angles are measured absolutely: a rod that has turned a thousand times is no less well known.
+        relative = np.concatenate([np.zeros(scene.n), np.ones(scene.n)])
+        self._limits = _limits(settings, relative)
+        self._h, self._outcome = control.FIRST_STEP, outcome.DONE
+
+    def advance_to(self, time: float) -> int:
+        """Advance to `time` and return how many steps that took."""
+        found = adaptive.integrate(self._system, DOP853, self._limits, self._t, self._h, time, self._y)
+        taken: int = found.accepted + found.rejected
+        self._t, self._h, self._outcome = found.t, found.h, found.outcome
+        self._limits = control.less(self._limits, taken) if taken else self._limits
+        return taken
+
+    def state(self) -> State:
+        """The state now."""
+        theta, omega = np.split(self._y.value, 2)
+        return State(theta.copy(), omega.copy())
+
+    def health(self) -> Fault | None:
+        """Whether it is finite and within its limits."""
+        return _given_up(self._outcome, self._t) or _finite(self._y.value)
+
+
+class Taylor:
+    """Taylor's method, its order chosen for the tolerance."""
+
+    def __init__(self, scene: Scene, settings: Mapping[str, Any]) -> None:
+        order = taylor.order_for(settings["tolerance"])
+        self._system, self._t, self._h = series_system_of(scene, order), 0.0, taylor.NO_STEP
+        self._series = taylor.series_from(scene.angles, scene.rates, order)
+        self._state = State(scene.angles.copy(), scene.rates.copy())
+        self._limits, self._outcome = _limits(settings, 1.0), outcome.DONE
+
+    def advance_to(self, time: float) -> int:
+        """Advance to `time` and return how many series that took."""
+        found = taylor.integrate(self._system, self._limits, self._t, self._h, time, self._series)
+        taken: int = found.accepted
+        self._t, self._h, self._outcome = found.t, found.h, found.outcome
+        self._limits = control.less(self._limits, taken) if taken else self._limits
+        reached = time - self._t if self._outcome == outcome.DONE else 0.0
+        taylor.state_at(reached, self._series, *self._state[:2])
+        return taken
+
+    def state(self) -> State:
+        """The state now."""
+        return State(self._state.theta.copy(), self._state.omega.copy())
+
+    def health(self) -> Fault | None:
+        """Whether it is finite and within its limits."""
+        return _given_up(self._outcome, self._t) or _finite(self._state.theta, self._state.omega)

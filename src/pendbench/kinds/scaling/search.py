@@ -1,0 +1,86 @@
+"""Which chain to try next against the clock, and with which step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from pendbench.kinds.scaling.work import RaceRun
+from pendbench.scene.scene import MAX_LINKS
+
+#: Steps of the trials: each is so many times shorter than the one before.
+FINER: Final = 1.5
+#: How well the longest chain is known: to this factor.
+PRECISION: Final = 1.1
+
+_FEWEST: Final = 8
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """The steps of the trials, s. fixed: whether the method takes them at all, or chooses its own."""
+
+    coarsest: float
+    finest: float
+    fixed: bool
+
+    def rung_above(self, wanted: float) -> float:
+        """A step of the ladder that is a little coarser than the one wanted."""
+        rungs = max(0, math.ceil(math.log(self.coarsest / (wanted * FINER)) / math.log(FINER)))
+        return float(f"{self.coarsest / FINER**rungs:.6g}")
+
+    def finer(self, dt: float) -> float | None:
+        """The next rung; None where there is none."""
+        finer = float(f"{dt / FINER:.6g}")
+        return finer if self.fixed and finer >= self.finest else None
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A chain of n links with a step dt (s), and how it fared."""
+
+    n: int
+    dt: float
+    run: RaceRun
+
+    @property
+    def held(self) -> bool:
+        """Whether it kept up with the clock, and its energy."""
+        return self.run.outcome == "held"
+
+
+def best_of(trials: Sequence[Trial]) -> Trial | None:
+    """The longest chain that held; of its trials the first."""
+    return max((trial for trial in trials if trial.held), key=lambda trial: trial.n, default=None)
+
+
+def nearest_beyond(trials: Sequence[Trial]) -> Trial | None:
+    """The shortest chain beyond the longest that held, with its finest step."""
+    best = best_of(trials)
+    beyond = [trial for trial in trials if best is None or trial.n > best.n]
+    return min(beyond, key=lambda trial: (trial.n, trial.dt), default=None)
+
+
+def next_trial(trials: Sequence[Trial], ladder: Ladder) -> tuple[int, float] | None:
+    """How many links, and which step, s; None where the longest chain is known."""
+    if not trials:
+        return _FEWEST, ladder.rung_above(ladder.coarsest)
+    last = trials[-1]
+    if last.run.outcome == "lost" and (finer := ladder.finer(last.dt)) is not None:
+        return last.n, finer
+    best = best_of(trials)
+    if best is None:
+        return (last.n // 2, ladder.rung_above(ladder.coarsest)) if last.n > 1 else None
+    n = _next_length(trials, best.n)
+    return None if n is None else (n, ladder.rung_above(best.dt * best.n / n))  # steps fall like 1/n
+
+
+def _next_length(trials: Sequence[Trial], longest: int) -> int | None:
+    """Twice the longest chain that held, or half way, on a logarithmic scale, to the next one that did not."""
+    above = [trial.n for trial in trials if trial.n > longest]
+    n = round(math.sqrt(longest * min(above))) if above else 2 * longest
+    if n > MAX_LINKS or (above and (min(above) <= PRECISION * longest or n in (longest, min(above)))):
+        return None
+    return n

@@ -1,0 +1,187 @@
+"""How long stepping takes. Nothing else is timed, one case at a time, and what the timings are worth is said."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from pendbench.base.faults import Fault
+from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation, State
+from pendbench.scene.scene import Scene
+
+T = TypeVar("T")
+
+REPEATS = 5
+_READINGS = 200
+_MOST_RUNS = 100  # that are put together for one sample, where each is short
+_SAMPLE_S = 0.01  # a sample shorter than this is mostly the clock's own noise
+
+
+class Timing(NamedTuple):
+    """step_us: the median cost of a step. spread: (largest - smallest) / median of the samples. steps: in one sample.
+
+    build_s: building the run. first_call_s: the first step of the first run, with what is compiled or loaded then.
+    run_s: stepping up to the time that was asked for (measured for an adaptive method, the steps' cost otherwise).
+    """
+
+    step_us: float
+    spread: float
+    steps: int
+    build_s: float
+    first_call_s: float
+    run_s: float
+
+
+def _fixed(engine: Engine, scene: Scene, method: str, dt: float, settings: dict[str, float], until: float) -> Timing:
+    """Samples of steps inside the time that is asked about: past it a run may have failed, and failing is quick."""
+
+    def build() -> Simulation:
+        simulation = engine.build(scene, method, dt, **settings)
+        assert isinstance(simulation, Simulation)
+        return simulation
+
+    total = max(1, round(until / dt))
+    first = build()
+    first_call = _seconds(partial(first.advance, 1))
+    steps = _steps_of_sample(build(), total)
+    samples, builds = [], []
+    for _ in range(REPEATS):
+        spent, taken = 0.0, 0
+        while spent < _SAMPLE_S and taken < _MOST_RUNS * steps:
+            begun = time.perf_counter()
+            simulation = build()
+            builds.append(time.perf_counter() - begun)
+            spent += _seconds(partial(simulation.advance, steps))
+            taken += steps
+        samples.append(spent / taken)
+    median = float(np.median(samples))
+    spread = float(np.ptp(samples)) / median
+    return Timing(median * 1e6, spread, taken, float(np.median(builds)), first_call, median * total)
+
+
+def _steps_of_sample(simulation: Simulation, most: int) -> int:
+    """How many of a run's steps fill a sample."""
+    taken, steps, spent = 0, 1, 0.0
+    while taken + steps <= most and spent < _SAMPLE_S / 4:
+        spent = _seconds(partial(simulation.advance, steps))
+        taken += steps
+        steps *= 2
+    return max(1, min(most, round(steps / 2 * _SAMPLE_S / max(spent, 1e-9))))
+
+
+def _adaptive(engine: Engine, scene: Scene, method: str, settings: dict[str, float], until: float) -> Timing:
+    """Samples of whole runs, from the start and without a stop: several in one sample, where they are short."""
+    builds: list[float] = []
+
+    def build() -> AdaptiveSimulation:
+        begun = time.perf_counter()
+        simulation = engine.build(scene, method, None, **settings)
+        builds.append(time.perf_counter() - begun)
+        assert isinstance(simulation, AdaptiveSimulation)
+        return simulation
+
+    first = build()
+    first_call = _seconds(lambda: first.advance_to(1e-6 * until))
+    samples, steps = [], 1
+    for _ in range(REPEATS):
+        spent, runs = 0.0, 0
+        while spent < _SAMPLE_S and runs < _MOST_RUNS:
+            simulation = build()
+            begun = time.perf_counter()
+            steps = max(1, simulation.advance_to(until))
+            spent += time.perf_counter() - begun
+            runs += 1
+        samples.append(spent / runs)
+    median = float(np.median(samples))
+    spread = float(np.ptp(samples)) / median
+    return Timing(median / steps * 1e6, spread, steps, float(np.median(builds)), first_call, median)
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    begun = time.perf_counter()
+    call()
+    return time.perf_counter() - begun
+
+
+def time_case(
+    engine: Engine, scene: Scene, method: str, dt: float | None, settings: dict[str, float], until: float
+) -> Timing:
+    """Time a method of an engine on a scene, `run_s` up to the time `until` (s)."""
+    if dt is None:
+        return _adaptive(engine, scene, method, settings, until)
+    return _fixed(engine, scene, method, dt, settings, until)
+
+
+def time_each_step(
+    engine: Engine, scene: Scene, method: str, dt: float | None, settings: dict[str, float], interval: float
+) -> float:
+    """The median cost, us, of one step and of reading the state, from Python.
+
+    For a method that chooses its steps: of advancing by `interval` (s) and reading it, which is what is asked of it.
+    """
+    simulation = engine.build(scene, method, dt, **settings)
+    samples = []
+    for i in range(_READINGS):
+        begun = time.perf_counter()
+        if isinstance(simulation, Simulation):
+            simulation.advance(1)
+        else:
+            simulation.advance_to((i + 1) * interval)
+        simulation.state()
+        samples.append(time.perf_counter() - begun)
+    return float(np.median(samples[_READINGS // 10 :])) * 1e6
+
+
+class Race(NamedTuple):
+    """How far a run came against the clock: simulated time reached and time spent stepping, s, and whether it was lost.
+
+    lost: `is_lost` said so of a sample's time (s) and state, or the engine said that something was wrong: fault.
+    """
+
+    reached: float
+    spent: float
+    lost: bool
+    fault: Fault | None = None
+
+
+def race(
+    engine: Engine,
+    scene: Scene,
+    method: str,
+    dt: float | None,
+    settings: dict[str, float],
+    samples: int,
+    is_lost: Callable[[float, State], bool],
+) -> Race:
+    """Run the scene for its duration, or until it has taken as long, or until it is lost; only stepping is timed."""
+    simulation = engine.build(scene, method, dt, **settings)
+    total = samples if dt is None else max(1, round(scene.duration / dt))
+    marks = np.unique(np.linspace(0, total, samples + 1).round().astype(int))
+    unit = scene.duration / samples if dt is None else dt
+    spent, reached = 0.0, 0.0
+    for before, mark in itertools.pairwise(marks.tolist()):
+        begun = time.perf_counter()
+        if isinstance(simulation, Simulation):
+            simulation.advance(mark - before)
+        else:
+            simulation.advance_to(mark * unit)
+        spent += time.perf_counter() - begun
+        reached = mark * unit
+        fault = simulation.health()
+        if fault is not None or is_lost(reached, simulation.state()):
+            return Race(reached, spent, lost=True, fault=fault)
+        if spent > scene.duration:
+            break
+    return Race(reached, spent, lost=False)
+
+
+def timed(call: Callable[[], T]) -> tuple[T, float]:
+    """What a call returns, and the processor time that it took, s: whatever else the machine does meanwhile."""
+    begun = time.process_time()
+    value = call()
+    return value, time.process_time() - begun

@@ -1,0 +1,64 @@
+"""The methods with a fixed step: a file each, in this folder, that ends by adding its own to `METHODS`.
+
+To add one, write its file: `heun.py`, say, with its coefficients and
+
+    add(runge_kutta_method("heun", HEUN, note="Heun's method, two stages"))
+
+or with a loop of its own, as `euler.py` has. Nothing else has to know of it.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from importlib import import_module
+from typing import Any
+
+import pendbench.solvers
+
+
+class Form(Enum):
+    """The variables that a method advances, and with them what `begin` gets and what its state has to hold."""
+
+    RATES = "angles and rates"  # begin(q, v); state.q, state.v
+    MOMENTA = "angles and momenta"  # begin(q, p, v); state.q, state.p
+    ENDS = "the rods' ends in the plane"  # begin(points, speeds); state.points, state.speeds and state.turns
+
+
+@dataclass(frozen=True)
+class FixedStep:
+    """A method with a fixed step.
+
+    begin: copies the start, arrays (d,) or (n, 2), into a state that holds all that is kept from step to step.
+    advance(system, state, first, dt, steps): take the steps from number `first` on, each of dt (s), the one with number
+    0 at time 0, and return how many could be taken. order: what it claims. note: a line for the documentation.
+    stuck and remedy: what to say where a step could not be taken, and what would help.
+    """
+
+    name: str
+    order: int
+    note: str
+    form: Form
+    begin: Callable[..., Any]
+    advance: Callable[[Any, Any, int, float, int], int]
+    stuck: str = ""
+    remedy: str = ""
+    substeps: bool = False
+
+
+_added: dict[str, FixedStep] = {}
+
+
+def add(method: FixedStep) -> None:
+    """Make a method known."""
+    _added[method.name] = method
+
+
+def fixed_step_methods() -> Mapping[str, FixedStep]:
+    """All of them, by name."""
+    for module in pkgutil.iter_modules(pendbench.solvers.__path__, "pendbench.solvers."):
+        if not module.ispkg:
+            import_module(module.name)
+    return {name: _added[name] for name in sorted(_added)}

@@ -1,0 +1,54 @@
+"""A table of cases as it stands in a CSV file: of a baseline, or of a study's results."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Final
+
+import pandas as pd
+
+from pendbench.base.errors import choose, printable
+from pendbench.base.faults import STATUSES
+from pendbench.measures.verdict import VERDICTS
+
+#: What names a case.
+KEYS: Final = ("scene", "engine", "method", "dt", "settings")
+
+
+def read_cases(path: Path, numbers: Iterable[str]) -> pd.DataFrame:
+    """The table; the columns that are named, and the step, are numbers, all others text.
+
+    Raises ValueError or ParserWarning where it is no such table, and OSError where it cannot be read.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)  # lines longer than the heading
+        table = pd.read_csv(path, dtype=str, keep_default_na=False, index_col=False)
+    for name in (*KEYS, "status"):
+        if name not in table:
+            raise ValueError(f"column {name!r} is missing")
+    for name in ("dt", *numbers):
+        if name in table:
+            table[name] = pd.to_numeric(table[name].where(table[name] != ""))
+    for status in table["status"]:
+        if status not in STATUSES:
+            raise ValueError(choose("status", printable(str(status)), STATUSES))
+    for verdict in table.get("verdict", ()):
+        if verdict not in VERDICTS:
+            raise ValueError(choose("verdict", printable(str(verdict)), VERDICTS))
+    return table
+
+
+def case_key(row: pd.Series) -> tuple[str, ...]:
+    """What tells the cases of a table apart, as text."""
+    dt = "" if pd.isna(row["dt"]) else f"{float(row['dt']):g}"
+    settings = "" if pd.isna(row["settings"]) else str(row["settings"])
+    return str(row["scene"]), str(row["engine"]), str(row["method"]), dt, settings
+
+
+def case_text(row: pd.Series, *, with_step: bool = True) -> str:
+    """A case in one line; without its step, all the steps of a method."""
+    scene, engine, method, dt, settings = case_key(row)
+    step = f"dt={dt}" if dt and with_step else ""
+    return " ".join(part for part in (scene, engine, method, step, settings) if part)

@@ -1,0 +1,65 @@
+"""Compiling what a study needs, once and side by side, before several jobs wait for the same."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendbench.base.errors import InputError
+from pendbench.engines.recording import simulate
+from pendbench.engines.registry import engine
+from pendbench.execution.runner import Runner
+from pendbench.execution.tasks import task
+from pendbench.physics.acting import is_plain
+from pendbench.scene.scene import Scene
+from pendbench.study.case import Case
+from pendbench.truth.reference import reference
+from pendbench.truth.solve import solve_angles, solve_vectors
+
+#: The kernels of the reference, each with what compiles it: under gravity alone its two forms can be had side by side.
+FORMS: Final[dict[str, Callable[[Scene], object]]] = {
+    "angle form": lambda scene: next(solve_angles(scene, np.array([1e-9]))),
+    "vector form": lambda scene: next(solve_vectors(scene, np.array([1e-9]))),
+    "reference": lambda scene: reference(scene, [1e-9]),
+}
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """That a kernel is there."""
+
+    status: str
+    reason: str = ""
+
+
+def compile_kernel(name: str, scene: Scene) -> Compiled:
+    """Compile one of `FORMS` or a method of the analytic engine, or load it where that was done before."""
+    try:
+        if name in FORMS:
+            FORMS[name](scene)
+        else:
+            adaptive = engine("analytic").methods[name].adaptive
+            simulate(scene, "analytic", name, None if adaptive else 1e-9, [1e-9])
+    except InputError as error:  # whoever asks for it will be told
+        return Compiled("refused", str(error))
+    return Compiled("ok")
+
+
+def compile_kernels(runner: Runner, scenes: Iterable[Scene], cases: Iterable[Case], *, truth: bool = True) -> None:
+    """Compile the kernels of the cases, and of the scenes' truth; each for the effects that act on its scene."""
+    methods: dict[tuple[str, frozenset[str]], Scene] = {}
+    forms: dict[tuple[str, frozenset[str]], Scene] = {}
+    for case in cases:
+        if case.engine == "analytic":
+            methods.setdefault((case.method, frozenset(case.scene.terms)), case.scene)
+    for scene in scenes if truth else ():
+        for name in ("angle form", "vector form") if is_plain(scene) else ("reference",):
+            forms.setdefault((name, frozenset()), scene)  # one for all effects
+    # By turns: two methods begun side by side compile the same equations, and so do two forms of the truth.
+    turns = itertools.zip_longest(methods.items(), forms.items())
+    wanted = dict(filter(None, itertools.chain.from_iterable(turns)))
+    runner.run("kernels compiled", {key: task(compile_kernel, key[0], scene) for key, scene in wanted.items()})

@@ -1,0 +1,279 @@
+"""The cache of compiled kernels: a folder for each file and state of its sources, and never in anybody's way."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pendbench.base import compiled
+from pendbench.physics.kernels.trigonometry import cosine_sine
+
+ADD = "def add(x, y):\n    return x + y\n"
+
+# A plug-in's system, advanced by one of our kernels. The derivative is a file of its own, so that it can be changed.
+PLUGIN = """
+from typing import NamedTuple
+from pendbench.base.compiled import compiled, specialise
+from pendbench.solvers import problem
+
+class Spring(NamedTuple):
+    stiffness: float
+
+@compiled
+def pull(system, t, q, v, a):
+    a[0] = -SIGN * system.stiffness * q[0]
+
+specialise(problem.acceleration, Spring, pull)
+"""
+USE_PLUGIN = """
+import numpy as np
+from plugin import Spring
+from pendbench.solvers.methods import fixed_step_methods
+euler = fixed_step_methods()["euler"]
+state = euler.begin(np.array([1.0]), np.array([0.0]))
+euler.advance(Spring(1.0), state, 0, 0.5, 1)
+print(state.q[0])
+"""
+USE_CHAIN = """
+import numpy as np
+from pendbench.physics.kernels.table import system_of
+from pendbench.scene.scene import Effects, Scene
+from pendbench.solvers.methods import fixed_step_methods
+chain = system_of(Scene("one", "", 1.0, [1.0], [1.0], [0.0], [1.0], Effects(gravity=1.0)))
+euler = fixed_step_methods()["euler"]
+state = euler.begin(np.array([0.0]), np.array([1.0]))
+euler.advance(chain, state, 0, 0.5, 1)
+print(state.q[0])
+"""
+# Watches numba compile a kernel for a system with effects, and one in 32 digits; prints how many functions it was.
+WATCHED = """
+from pathlib import Path
+import numpy as np
+from numba.core.dispatcher import _FunctionCompiler
+from pendbench.base import compiled
+from pendbench.physics.extended import inertias
+from pendbench.solvers.extended.extrapolation import integrate_extended, neville_weights
+from pendbench.physics.kernels.table import system_of
+from pendbench.scene.scene import Effects, Scene
+from pendbench.solvers.methods import fixed_step_methods
+
+above, seen, compile = [], set(), _FunctionCompiler.compile
+
+def watched(self, *rest):
+    file = Path(self.py_func.__code__.co_filename)
+    if compiled._PACKAGE in file.parents:
+        above.append(file)
+        for kernel in above:
+            assert file in compiled.sources_of(kernel), (file, kernel)
+        seen.add(self.py_func)
+    try:
+        return compile(self, *rest)
+    finally:
+        if compiled._PACKAGE in file.parents:
+            above.pop()
+
+_FunctionCompiler.compile = watched
+acting = Effects(gravity=1.0, joint_damping=0.1, air_drag={"linear": 0.1})
+scene = Scene("one", "", 1.0, [1.0], [1.0], [0.0], [1.0], acting)
+euler = fixed_step_methods()["euler"]
+euler.advance(system_of(scene), euler.begin(scene.angles, scene.rates), 0, 0.5, 1)
+system, state = inertias.inertia_form(scene)
+integrate_extended(system, neville_weights(4), 0.0, 0.1, 0.1, state, 1.0, np.ones(len(state)), 1e-9, 1)
+print(len(seen))
+"""
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package of kernels, whose cache is in an empty folder: one is a solver's, one arrives in it by type."""
+    files = {
+        "base/compiled.py": "",
+        "solvers/problem.py": "",
+        "solvers/stepping.py": "from package.solvers import problem\nfrom package.solvers.adding import add\n",
+        "solvers/adding.py": ADD,
+        "solvers/other.py": ADD,
+        "physics/table.py": "from package.physics import laws\nfrom package.base.compiled import specialise\n",
+        "physics/laws.py": "def f():\n    from package.physics.deep import add\n",
+        "physics/deep.py": ADD,
+        "scene.py": ADD,
+    }
+    for name, text in files.items():
+        (tmp_path / "package" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "package" / name).write_text(text)
+    monkeypatch.setattr(compiled, "_PACKAGE", tmp_path / "package")
+    monkeypatch.setattr(compiled, "_sources_outside", [])
+    monkeypatch.setattr(compiled.config, "CACHE_DIR", str(tmp_path / "cache"))
+    forget()
+    yield tmp_path / "package"
+    forget()
+
+
+def forget():
+    for function in (
+        compiled._inside,
+        compiled._imported,
+        compiled._arriving_by_type,
+        compiled._digest,
+        compiled._home,
+    ):
+        function.cache_clear()
+
+
+def name_of(source):
+    """The cache's name for that file's kernels, as another process would find it."""
+    forget()
+    return compiled.cache_name(source)
+
+
+def home():
+    forget()
+    return compiled._home()
+
+
+def test_cache_is_where_numba_was_told_to_cache(package):
+    assert home() == package.parent / "cache/pendbench"
+    assert home().is_dir()
+
+
+KNOWN = ["solvers/stepping.py", "solvers/adding.py", "solvers/problem.py", "base/compiled.py"]
+BY_TYPE = ["physics/table.py", "physics/laws.py", "physics/deep.py"]
+
+
+@pytest.mark.parametrize("name", [*KNOWN, *BY_TYPE])
+def test_name_changes_with_all_that_a_kernel_can_hold(package, name):
+    stepping = package / "solvers/stepping.py"
+    before = name_of(stepping)
+    assert name_of(stepping) == before
+    (package / name).write_text((package / name).read_text() + "# changed\n")
+    assert name_of(stepping) != before
+
+
+@pytest.mark.parametrize("name", ["solvers/other.py", "solvers/new.py", "scene.py"])
+def test_name_does_not_change_with_anything_else(package, name):
+    stepping = package / "solvers/stepping.py"
+    before = name_of(stepping)
+    (package / name).write_text(ADD.replace("x + y", "x - y"))
+    assert name_of(stepping) == before
+
+
+def test_what_begins_to_arrive_by_type_is_in_every_name(package):
+    stepping = package / "solvers/stepping.py"
+    before = name_of(stepping)
+    (package / "solvers/new.py").write_text("from package.base.compiled import chosen_by_type\n")
+    assert name_of(stepping) != before
+
+
+def test_kernels_from_outside_change_with_every_source(package, tmp_path):
+    before = name_of(tmp_path / "mine.py")
+    (package / "solvers/other.py").write_text(ADD.replace("x + y", "x - y"))
+    assert name_of(tmp_path / "mine.py") != before
+
+
+def modules(path):
+    """What a source imports, as its syntax tree has it."""
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_no_import_of_a_kernel_is_missed():
+    inside = compiled._inside()
+    assert len(inside) > 40
+    for path in inside.values():
+        expected = {inside[name] for name in modules(path) if name in inside}
+        assert expected <= compiled._imported(path) <= compiled.sources_of(path)
+
+
+def test_all_that_is_compiled_into_a_kernel_is_in_its_name(tmp_path):
+    """As numba sees it: every function that it compiles on the way to a kernel is in a file that the name has."""
+    found = run(WATCHED, tmp_path)
+    assert found > 20
+
+
+def test_nothing_but_two_functions_gives_kernels_by_type():
+    """`_arriving_by_type` looks for their names."""
+    for path in compiled._inside().values():
+        if path.name != "compiled.py":
+            assert not {"overload", "overload_method", "register_jitable", "generated_jit"} & set(
+                compiled._WORD.findall(path.read_text("utf-8"))
+            )
+
+
+def test_name_changes_with_a_system_from_outside(package, tmp_path, monkeypatch):
+    stepping, plugin = package / "solvers/stepping.py", tmp_path / "plugin.py"
+    before = name_of(stepping)
+    plugin.write_text(ADD)
+    monkeypatch.setattr(compiled, "_kernels", [])
+    compiled._know_source(package / "physics/laws.py")
+    assert name_of(stepping) == before
+    compiled._know_source(plugin)
+    assert name_of(stepping) != before
+
+
+def test_system_typed_at_a_prompt_trusts_no_cache(package, monkeypatch):
+    monkeypatch.setattr(compiled, "_sources_outside", [Path("<stdin>")])
+    stepping = package / "solvers/stepping.py"
+    assert name_of(stepping) != name_of(stepping)
+
+
+def test_default_is_the_user_s_cache(package, tmp_path, monkeypatch):  # noqa: ARG001
+    monkeypatch.setattr(compiled.config, "CACHE_DIR", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert home().parent == tmp_path / "xdg"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    assert home().parent == tmp_path / "home/.cache"
+
+
+def test_unwritable_cache_is_replaced_by_one_for_this_process(package, tmp_path, monkeypatch):  # noqa: ARG001
+    (tmp_path / "file").write_text("no folder can be made below a file, whoever tries")
+    monkeypatch.setattr(compiled.config, "CACHE_DIR", str(tmp_path / "file/cache"))
+    removed = []
+    monkeypatch.setattr(compiled.atexit, "register", lambda function, folder, **_: removed.append((function, folder)))
+    replacement = home()
+    assert replacement.is_dir()
+    assert tmp_path not in replacement.parents
+    [(function, last)] = removed
+    assert last == replacement
+    function(last)
+    assert not replacement.exists()
+
+
+def test_numba_s_own_setting_is_left_as_it_was(package):
+    before = compiled.config.CACHE_DIR
+    kernel = compiled.compiled(lambda x: x + 1)
+    compiled._kernels.remove(kernel)
+    assert before == compiled.config.CACHE_DIR
+    assert Path(kernel.stats.cache_path).is_relative_to(home())
+    assert package.exists()
+
+
+def test_small_kernel_called_from_python_is_an_error_and_no_crash():
+    with pytest.raises(TypeError, match="cosine_sine is compiled into other kernels; allowed: a call in one of them"):
+        cosine_sine(1.0, 0.0)
+
+
+def run(script, cache):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return float(done.stdout)
+
+
+def test_plugin_s_kernels_are_neither_stale_nor_in_the_way_of_others(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    plugin, cache = tmp_path / "plugin.py", tmp_path / "cache"
+    plugin.write_text(PLUGIN.replace("SIGN", "1.0"))
+    assert run(USE_PLUGIN, cache) == 0.75
+    plugin.write_text(PLUGIN.replace("SIGN", "2.0"))
+    assert run(USE_PLUGIN, cache) == 0.5
+    plugin.unlink()
+    assert run(USE_CHAIN, cache) == 0.5

@@ -1,0 +1,188 @@
+"""What is special to the engines of the league. That they keep their promises is tested by the conformance kit."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from pendbench.base.errors import MissingEngineError
+from pendbench.engines import registry
+from pendbench.engines.registry import engine, engine_names, only_by_name
+from pendbench.engines.silence import silenced
+from pendbench.physics.energy import energy
+from pendbench.scene.scene import Effects
+from support.installed import installed_engines
+from support.scenes import chain
+
+#: The packages that the optional ones import.
+PACKAGES = {
+    "box2d": "pyb2d3",
+    "dart": "dartpy",
+    "drake": "pydrake",
+    "exudyn": "exudyn",
+    "mjx": "jax",
+    "newton": "newton",
+    "pybullet": "pybullet",
+    "rapier": "rapier3d",
+}
+THERE = installed_engines()
+
+
+def needs(name):
+    return pytest.mark.skipif(name not in THERE, reason=f'needs pip install "pendbench[{name}]"')
+
+
+def run(name, method, scene, dt, steps, **settings):
+    made = engine(name).build(scene, method, dt, **settings)
+    made.advance(steps)
+    return made
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_without_its_package_the_message_is_the_command_that_brings_it(name, monkeypatch):
+    inside = [module for module in sys.modules if module.startswith(f"{PACKAGES[name]}.")]
+    for module in (PACKAGES[name], *inside):
+        monkeypatch.setitem(sys.modules, module, None)  # importing it now fails as if it were not there
+    for module in [module for module in sys.modules if module.startswith(f"pendbench.engines.{name}")]:
+        monkeypatch.delitem(sys.modules, module)
+    with pytest.raises(MissingEngineError) as caught:
+        registry.engine(name)
+    assert f'pip install --upgrade "pendbench[{name}]"' in str(caught.value)
+
+
+def test_listing_engines_and_asking_which_run_unasked_loads_none():
+    names = ", ".join(map(repr, PACKAGES.values()))
+    code = f"""
+        import sys
+        from pendbench.engines.registry import engine_names, only_by_name
+        assert [name for name in engine_names() if only_by_name(name)]
+        assert not {{{names}}} & set(sys.modules)
+    """
+    subprocess.run([sys.executable, "-c", "\n".join(map(str.strip, code.splitlines()))], check=True)
+    assert {name for name in engine_names() if only_by_name(name)} >= {*PACKAGES, "scipy", "xpbd"}
+
+
+def test_what_is_silenced_writes_nothing_from_compiled_code_either(capfd):
+    with silenced():
+        print("from Python")
+        subprocess.run(
+            [sys.executable, "-c", "import os; os.write(1, b'outside'); os.write(2, b'outside')"], check=True
+        )
+    print("after")
+    assert capfd.readouterr() == ("after\n", "")
+
+
+# scipy
+
+
+def test_the_default_tolerance_is_the_one_that_people_get_and_a_tight_one_is_another_thing():
+    scene = chain(2, angle=[0.6, 0.9])
+    ends = {}
+    for method in ("rk45", "dop853", "lsoda", "radau", "tight"):
+        made = engine("scipy").build(scene, method, None)
+        made.advance_to(1.0)
+        ends[method] = made.state().theta
+    assert all(1e-6 < np.abs(ends[name] - ends["tight"]).max() < 0.1 for name in ("rk45", "dop853", "lsoda", "radau"))
+
+
+def test_solve_ivp_gives_the_same():
+    from scipy.integrate import solve_ivp
+
+    from pendbench.physics.dense import accelerations
+
+    scene = chain(2, angle=[0.6, 0.9])
+    start = np.concatenate([scene.angles, scene.rates])
+    found = solve_ivp(lambda _, y: [*y[2:], *accelerations(scene, y[:2], y[2:])], (0.0, 2.0), start, t_eval=[1.0])
+    made = engine("scipy").build(scene, "rk45", None)
+    made.advance_to(1.0)
+    # The two equations differ in rounding alone.
+    np.testing.assert_allclose(np.concatenate(made.state()[:2]), found.y[:, 0], rtol=0, atol=1e-12)
+
+
+def test_too_many_steps_are_a_status():
+    made = engine("scipy").build(chain(1), "rk45", None, most_steps=5)
+    assert made.advance_to(100.0) == 5
+    assert made.health().status == "work limit"
+
+
+# xpbd
+
+
+def test_one_pass_over_the_rods_loses_energy_and_more_with_longer_steps():
+    scene = chain(3, angle=0.9)
+    lost = []
+    for steps in (1000, 2000):
+        end = run("xpbd", "small_steps", scene, 1.0 / steps, steps).state()
+        lost.append(float(energy(scene, scene.angles, scene.rates) - energy(scene, end.theta, end.omega)))
+    assert 0.0 < lost[1] < lost[0]
+    assert lost[0] / lost[1] == pytest.approx(2.0, rel=0.1)  # of order 1
+
+
+def test_rods_hold_where_they_are_iterated_and_give_where_they_are_not():
+    scene = chain(5, angle=0.9)
+    assert run("xpbd", "iterated", scene, 1e-3, 200).state().gap < 1e-13
+    assert run("xpbd", "small_steps", scene, 1e-3, 200).state().gap > 1e-8
+
+
+def test_too_few_iterations_are_a_status():
+    assert run("xpbd", "iterated", chain(5, angle=0.9), 1e-2, 10, iterations=1).health().status == "not converged"
+
+
+def test_turns_are_counted():
+    spun = run("xpbd", "second_order", chain(1, rate=20.0, gravity=None), 1e-4, 10_000).state()
+    assert spun.theta[0] == pytest.approx(chain(1).angles[0] + 20.0, abs=1e-2)
+
+
+# Engines with packages of their own
+
+
+@needs("box2d")
+def test_rigid_joints_of_box2d_are_springs_of_60_hz_and_springs_are_stiffer():
+    scene = chain(1, angle=0.0, length=1.0)
+    stretched = 9.81 / (2.0 * math.pi * 60.0) ** 2
+    assert run("box2d", "default", scene, 1e-3, 2000).state().gap == pytest.approx(stretched, rel=0.05)  # measured: 3 %
+    assert run("box2d", "stiff", scene, 1e-3, 2000).state().gap < 0.02 * stretched
+
+
+@needs("pybullet")
+def test_pybullet_writes_nothing_to_the_terminal():
+    code = "from pendbench.engines.registry import engine; engine('pybullet').version()"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    assert (done.stdout, done.stderr) == (b"", b"")
+
+
+@needs("dart")
+def test_dart_writes_nothing_to_the_terminal_about_points(capfd):
+    run("dart", "euler", chain(2), 1e-3, 1)
+    assert capfd.readouterr() == ("", "")
+
+
+@needs("rapier")
+def test_a_free_link_of_rapier_keeps_turning():
+    """The damping that it gives every joint of a multibody would leave 3 % of the rate."""
+    scene = chain(1, rate=1.0, gravity=None)
+    assert run("rapier", "multibody", scene, 1e-3, 1000).state().omega[0] == pytest.approx(1.0, abs=1e-4)
+
+
+@needs("drake")
+def test_a_discrete_plant_takes_as_many_steps_as_are_asked_for():
+    """Semi-implicit Euler from rest: after k steps the angle has fallen by k (k + 1) / 2 times the first fall."""
+    scene = chain(1, angle=1e-6)
+    for dt in (0.1e-3, 1.0 / 3000.0):
+        fall = 1e-6 - run("drake", "discrete", scene, dt, 1).state().theta[0]
+        gone = 1e-6 - run("drake", "discrete", scene, dt, 7).state().theta[0]
+        assert gone / fall == pytest.approx(28.0, rel=1e-3)
+
+
+@needs("exudyn")
+def test_exudyn_evaluates_a_drive_at_its_time():
+    """A torque of sin(2 pi t) on a link without weight turns it by t - sin(2 pi t) / 2 pi over 2 pi I, after t s."""
+    drive = {"joint": 1, "amplitude": 1.0, "angular_frequency": 2.0 * math.pi, "phase": 0.0}
+    driven = dataclasses.replace(chain(1, angle=0.0), effects=Effects(drive_torque=drive))
+    found = run("exudyn", "rk4", driven, 1e-2, 100).state().theta[0]
+    assert found == pytest.approx(1.0 / (2.0 * math.pi), rel=1e-6)

@@ -1,0 +1,56 @@
+"""Films and strips of a stage: they move, they are whole, and what cannot be written is one line."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pendbench.base.errors import InputError
+from pendbench.report.stage.film import film, strip
+from support.browser import small_stage
+
+
+def test_a_film_has_a_picture_for_each_moment_and_they_differ():
+    found = Image.open(io.BytesIO(film(small_stage(), "gif")))
+    assert found.n_frames == 80  # 4 s, 20 a second
+    found.seek(0)
+    first = np.array(found.convert("RGB"))
+    found.seek(40)
+    assert (np.array(found.convert("RGB")) != first).any()
+    assert found.info["duration"] == 50
+
+
+def test_a_strip_shows_each_run_in_its_colour():
+    picture = np.array(Image.open(io.BytesIO(strip(small_stage(), 3))).convert("RGB"))
+    for colour in ([0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00]):
+        assert (picture == colour).all(axis=-1).sum() > 100
+    assert picture.shape[1] > 2 * picture.shape[0]
+
+
+def test_an_mp4_is_a_film_that_players_take(tmp_path):
+    if shutil.which("ffmpeg") is None or shutil.which("ffprobe") is None:
+        pytest.skip("no ffmpeg on this machine: apt-get install ffmpeg")
+    path = tmp_path / "film.mp4"
+    path.write_bytes(film(small_stage(), "mp4"))
+    asked = "stream=codec_name,pix_fmt,nb_read_frames,width,height"
+    told = subprocess.run(
+        ["ffprobe", "-v", "error", "-count_frames", "-show_entries", asked, "-of", "json", str(path)],
+        check=True, capture_output=True, text=True,
+    ).stdout  # fmt: skip
+    (stream,) = json.loads(told)["streams"]
+    assert (stream["codec_name"], stream["pix_fmt"], stream["nb_read_frames"]) == ("h264", "yuv420p", "80")
+    assert stream["width"] % 2 == stream["height"] % 2 == 0
+
+
+def test_without_ffmpeg_an_mp4_is_one_line(monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(InputError, match="needs the program ffmpeg"):
+        film(small_stage(), "mp4")
