@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-# In CI the examples are the same at every run, so that what fails there fails here; elsewhere they are new ones each time.
+# In CI the examples are the same at every run, so that what fails there fails here; elsewhere they are new ones.
 settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize="CI" in os.environ
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -299,3 +300,21 @@ def test_every_module_with_mutants_has_tests_of_its_own():
     assert [f"src/pendbench/{module}" for module in config["tests"]] == modules
     named = [argument for arguments in config["tests"].values() for argument in arguments if ".py" in argument]
     assert all((ROOT / path).is_file() for path in [*modules, *named])
+
+
+#: What stands for a name, or for what a reader makes.
+PLACEHOLDERS = re.compile(r"NAME|heun\.py|report\.md|my_package")
+NAMED = re.compile(r"`([A-Za-z_/]+\.(?:py|js|md\.j2|toml|xml))`")
+
+
+def test_every_file_that_a_document_names_is_there():
+    rooms = [ROOT / name for name in ("src", "tests", "docs", "models", "studies", "benchmarks")]
+    listed = [f"/{path.relative_to(ROOT)}" for room in rooms for path in room.rglob("*.*")] + ["/pyproject.toml"]
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "src").rglob("*.py")]
+    gone = {
+        f"{page.relative_to(ROOT)}: {name}"
+        for page in pages
+        for name in NAMED.findall(page.read_text("utf-8"))
+        if not PLACEHOLDERS.search(name) and not any(path.endswith(f"/{name}") for path in listed)
+    }
+    assert not gone

@@ -27,14 +27,14 @@ compiled, and called with numpy arrays, and with numbers of 32 digits. Where all
 - `rotor_inertias(term)`: (n,) kg m^2, that turn with the joints' own angles.
 
 i is an index in a kernel and `...` for numpy, where bend, rate, x and y are arrays (..., n). An effect that pushes in
-none of these ways needs a law more, here and in `physics/laws.py`.
+none of these ways needs a law more, here and in `physics/kernels/laws.py`.
 
 Then add the effect's line to `Effects`. The solvers, the energy, the truth and the studies know it from there. An
 engine refuses it until its adapter's `effects` says by what means it simulates it. MuJoCo, pymunk and Pinocchio compute
 what they have no means for from the laws above, so that a line is all they need, and the conformance kit looks at what
 comes of it. `python -m pendbench.engines.effects_table` writes the table of docs/effects.md. What is left is to measure
-it and to hold it: a scene in `models/` and in `studies/effects.toml`, a line in `tests/effect_sets.py`, and what its
-value means in docs/effects.md.
+it and to hold it: a scene in `models/` and in `studies/effects.toml`, a line in `tests/support/effect_sets.py`, and
+what its value means in docs/effects.md.
 """
 
 from __future__ import annotations

@@ -145,7 +145,7 @@ DT: Final = Column(
     empty="its own",
 )  # fmt: skip
 SETTINGS: Final = text_column(
-    "settings", "settings", "settings of the method that differ from its defaults", lambda row: row.case.settings_text
+    "settings", "settings", "settings of the method that the study gives it", lambda row: row.case.settings_text
 )
 #: What every row of a case begins with; the row has its `case`.
 CASE: Final = (SCENE_NAME, N, ENGINE, METHOD, DT, SETTINGS)

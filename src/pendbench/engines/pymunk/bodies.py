@@ -1,6 +1,6 @@
 """A chain of rods with mass in pymunk: bodies that turn, each a rod with its mass at the end, held by pivot joints.
 
-The same step as that of the masses on pins (`pymunk.py`), and the same half step between positions and velocities in
+The same step as that of the masses on pins (`adapter.py`), and the same half step between positions and velocities in
 `tuned`. Angles are those of the bodies, which count turns by themselves.
 """
 
