@@ -10,7 +10,6 @@ import sympy as sp
 
 from pendbench.physics import dense
 from pendbench.scene.scene import Effects, Scene
-from pendbench.truth.proof.system import Constants, balance
 
 N = 3
 LINKS = range(N)
@@ -168,68 +167,3 @@ def test_dense_form_is_the_lagrangian_s():
         (derived_gravity, dense.weight_torques(scene, angles)),
     ):
         np.testing.assert_allclose(found, sp.lambdify(symbols, derived)(*values), rtol=0, atol=1e-13)
-
-
-class Expression:
-    """An expression, as a number of those that proofs evaluate the equations with."""
-
-    def __init__(self, value):
-        self.value = sp.sympify(value)
-
-    def __add__(self, other):
-        return Expression(self.value + value_of(other))
-
-    def __sub__(self, other):
-        return Expression(self.value - value_of(other))
-
-    def __mul__(self, other):
-        return Expression(self.value * value_of(other))
-
-    def __neg__(self):
-        return Expression(-self.value)
-
-    __radd__, __rmul__ = __add__, __mul__
-
-    def sin(self):
-        return Expression(sp.sin(self.value))
-
-    def cos(self):
-        return Expression(sp.cos(self.value))
-
-    def is_zero(self):
-        return self.value == 0
-
-
-def value_of(x):
-    return x.value if isinstance(x, Expression) else x
-
-
-@cache
-def enclosed():
-    """What a proof evaluates, C and S omega^2 - h + Q, in symbols."""
-    none = [Expression(0) for _ in LINKS]
-    nothing = [[Expression(0)] * (i + 1) for i in LINKS]
-    constants = Constants(
-        n=N,
-        inertia=[[Expression(weight(i, j)) for j in range(i + 1)] for i in LINKS],
-        rotors=nothing,
-        drag=nothing,
-        weights=[Expression(hanging(i) * LENGTH[i]) for i in LINKS],
-        pulled=none,
-        damping=none,
-        stiffness=none,
-        rest=none,
-        torque=none,
-        gravity=Expression(G),
-        pivot=None,
-        motor=None,
-    )
-    return balance(constants, list(map(Expression, ANGLE)), list(map(Expression, RATE)), Expression(0))
-
-
-@pytest.mark.parametrize("i", LINKS)
-def test_what_proofs_enclose_is_the_lagrangian_s(i):
-    matrix, right = enclosed()
-    accelerated = sum(value_of(matrix[max(i, j)][min(i, j)]) * ACCELERATION[j] for j in LINKS)
-    assert is_zero(euler_lagrange(i) - (accelerated - value_of(right[i])))
-    assert not is_zero(euler_lagrange(i) - (accelerated + value_of(right[i])))

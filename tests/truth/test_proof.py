@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("flint", reason="the extra `proof` is not installed")
 
 import mpmath as mp
-from flint import acb, arb, arb_mat
+from flint import acb, acb_poly, arb, arb_mat
 
 from pendbench.effects import Effects
 from pendbench.physics import dense
@@ -250,6 +250,25 @@ def precise_root(x):
 
 def without_size(largest):
     return bounds.Largest(largest.radius, largest.size * 0, largest.boxes)
+
+
+@pytest.mark.parametrize("form", [Rates, Momenta])
+def test_no_slope_in_the_disc_and_the_tube_is_larger_than_said(form):
+    """At points chosen by chance, on the disc's edge and the tube's, where analytic functions are largest."""
+    scene, rng, radius = with_effects("links"), np.random.default_rng(1), 0.25
+    with precision(effort_of(BITS).bits):
+        system = form(scene)
+        path = near_solution(system, [x.mid() for x in system.start(scene)], arb(0), 2.0**-3, effort_of(BITS))
+    said = bounds.largest_slope(system, path, radius)
+    largest = 0.0
+    with precision(BITS):
+        for angle, *turns in rng.uniform(0.0, 2 * np.pi, (20, 1 + 6)):
+            u = acb(radius * np.cos(angle), radius * np.sin(angle)) * (1 - 1e-9)
+            tube = [acb(np.cos(turn), np.sin(turn)) * bounds.TUBE for turn in turns]
+            state = [acb_poly(its)(u) + z for its, z in zip(path.state, tube, strict=True)]
+            found = system.slope(state, u * path.span + path.start)
+            largest = max(largest, *(float((x * path.span).abs_upper()) for x in found))
+    assert 0.3 * float(said.size) < largest < float(said.size)  # measured: 0.67 of it, and 0.90
 
 
 def test_a_step_too_long_is_not_proved():

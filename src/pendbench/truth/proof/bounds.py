@@ -58,7 +58,7 @@ def largest_slope(system: Rates, path: Path, radius: float) -> Largest | None:
 
     with precision(BITS, _LOW + 1):
         bound = arb(radius)
-        shifted, tails = _low_part(path, bound)
+        low, tails = _low_part(path, bound)
         worst, boxes = arb(0), [(x, 0.25, 0.5) for x in (-0.75, -0.25, 0.25, 0.75)]
         boxes += [(x, 0.75, 0.5) for x in (-0.75, -0.25, 0.25, 0.75)]
         tried = 0
@@ -69,7 +69,7 @@ def largest_slope(system: Rates, path: Path, radius: float) -> Largest | None:
             tried += 1
             if tried > _MOST_BOXES:
                 return None
-            found = _over_box(system, path, shifted, tails, radius, (x, y, side))
+            found = _over_box(system, path, low, tails, radius, (x, y, side))
             if found is None:
                 quarter = side / 4
                 boxes += [(x + a, y + b, side / 2) for a in (-quarter, quarter) for b in (-quarter, quarter)]
@@ -100,25 +100,28 @@ def _over_box(
     radius: float,
     box: tuple[float, float, float],
 ) -> Number | None:
-    """|H f| over a square and the tube; None where the equations may be singular there."""
+    """|H f| over a square and the tube; None where the equations may be singular there.
+
+    Angles between rods are polynomials of their own there: as differences of balls they would be wider.
+    """
     from flint import acb, acb_poly, arb
 
     x, y, side = box
     middle = acb(arb(x) * radius, arb(y) * radius)
     half = arb(side) * radius / 2
-    reach = (half * 2).sqrt() * half.sqrt()  # sqrt(2) half
-    state = []
-    for its, tail in zip(low, tails, strict=True):
-        coefficients = its(acb_poly([middle, acb(1)])).coeffs() or [acb(0)]
-        wide = arb(0)
-        for c in reversed(coefficients[1:]):
-            wide = ((wide + c.abs_upper()) * reach).abs_upper()
-        wide = (wide + tail + TUBE).abs_upper()
-        ball = arb(0, wide)
-        state.append(coefficients[0] + acb(ball, ball))
-    u = middle + acb(arb(0, half), arb(0, half))
+    square = acb(arb(0, half), arb(0, half))
+    shift = acb_poly([middle, acb(1)])
+
+    def over(its: Number, left_out: Number) -> Number:
+        ball = arb(0, left_out.abs_upper())
+        return its(shift)(square) + acb(ball, ball)
+
+    wide = [tail + TUBE for tail in tails]
+    state = [over(its, its_wide) for its, its_wide in zip(low, wide, strict=True)]
+    apart = [[over(low[i] - low[j], wide[i] + wide[j]) for j in range(i)] for i in range(system.n)]
+    u = middle + square
     try:
-        slope = system.slope(state, u * path.span + path.start)
+        slope = system.slope(state, u * path.span + path.start, apart)
     except ZeroDivisionError:
         return None
     sizes = [its.abs_upper() * path.span for its in slope]

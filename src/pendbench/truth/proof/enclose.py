@@ -32,15 +32,15 @@ TOO_WIDE: Final = "it would need more than %d bits"
 
 
 def effort_of(bits: int) -> Effort:
-    """An order and a low precision that suit: the step is about a fifth of the radius of convergence."""
-    order = round(0.43 * bits)
+    """An order and a low precision that suit: the step is about a third of the disc that is covered."""
+    order = round(0.6 * bits)
     return Effort(bits, order, 128, max(28, order // 4))
 
 
 def other_effort(effort: Effort) -> Effort:
     """Another one, for the same radii."""
     bits = effort.bits + 41
-    return Effort(bits, round(0.37 * bits), 144, effort.small_order + 5)
+    return Effort(bits, round(0.5 * bits), 144, effort.small_order + 5)
 
 
 @dataclass(frozen=True)

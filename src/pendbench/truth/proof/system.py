@@ -17,6 +17,9 @@ from pendbench.base.errors import InputError
 from pendbench.scene.scene import Scene
 from pendbench.truth.proof.numbers import Number, sine_cosine, solve
 
+#: [i][j], j <= i or j < i.
+Lower = list[list[Number]]
+
 #: The effects that are known here. What is not is refused: a proof of other equations would prove nothing.
 KNOWN = frozenset(
     {
@@ -66,9 +69,9 @@ class Constants:
     """
 
     n: int
-    inertia: list[list[Number]]
-    rotors: list[list[Number]]
-    drag: list[list[Number]]
+    inertia: Lower
+    rotors: Lower
+    drag: Lower
     weights: list[Number]
     pulled: list[Number]
     damping: list[Number]
@@ -140,7 +143,7 @@ def _outwards(values: list[Number]) -> list[Number]:
     return [sum(values[i + 1 :], values[i]) for i in range(len(values))]
 
 
-def _rotors(rotors: list[Number]) -> list[list[Number]]:
+def _rotors(rotors: list[Number]) -> Lower:
     """What rotors in the joints add to C, lower half: (E55)."""
     n = len(rotors)
     lower = [[0 * rotors[0] for _ in range(i + 1)] for i in range(n)]
@@ -172,10 +175,10 @@ class Rates:
         """Angles and rates, rad and rad/s, from a state of balls."""
         return list(state[: self.n]), [w * self.scale for w in state[self.n :]]
 
-    def slope(self, x: Sequence[Number], t: Number) -> list[Number]:
-        """The state's derivative with respect to time, at t s."""
+    def slope(self, x: Sequence[Number], t: Number, apart: Lower | None = None) -> list[Number]:
+        """The state's derivative with respect to time, at t s. apart: what is known better of theta_i - theta_j."""
         omega = [w * self.scale for w in x[self.n :]]
-        matrix, right = balance(self.constants, x[: self.n], omega, t)
+        matrix, right = balance(self.constants, x[: self.n], omega, t, apart)
         return [*omega, *(a * (1 / self.scale) for a in solve(matrix, right))]
 
 
@@ -202,10 +205,10 @@ class Momenta(Rates):
         theta, momenta = list(state[: self.n]), [p * self.unit for p in state[self.n :]]
         return theta, solve(_matrix(self.constants, theta)[0], momenta)
 
-    def slope(self, x: Sequence[Number], t: Number) -> list[Number]:
-        """The state's derivative with respect to time, at t s."""
+    def slope(self, x: Sequence[Number], t: Number, apart: Lower | None = None) -> list[Number]:
+        """The state's derivative with respect to time, at t s. apart: what is known better of theta_i - theta_j."""
         theta, momenta, c = x[: self.n], [p * self.unit for p in x[self.n :]], self.constants
-        matrix, sines, cosines = _matrix(c, theta)
+        matrix, sines, cosines = _matrix(c, theta, apart)
         omega = solve(matrix, momenta)
         right = _forces(c, theta, omega, cosines, t)
         for i in range(self.n):
@@ -216,10 +219,10 @@ class Momenta(Rates):
 
 
 def balance(
-    c: Constants, theta: Sequence[Number], omega: Sequence[Number], t: Number
-) -> tuple[list[list[Number]], list[Number]]:
+    c: Constants, theta: Sequence[Number], omega: Sequence[Number], t: Number, apart: Lower | None = None
+) -> tuple[Lower, list[Number]]:
     """The lower half of C, and S omega^2 - h + Q, of C theta'' = S omega^2 - h + Q. (E6), (E40)."""
-    matrix, sines, cosines = _matrix(c, theta)
+    matrix, sines, cosines = _matrix(c, theta, apart)
     right = _forces(c, theta, omega, cosines, t)
     squares = [w * w for w in omega]
     for i in range(c.n):
@@ -239,9 +242,9 @@ def own_scale(scene: Scene) -> float:
     return 2.0 ** round(math.log2(max(fast))) if max(fast) > 0.0 else 1.0
 
 
-def _matrix(c: Constants, theta: Sequence[Number]) -> tuple[list[list[Number]], list[list[Number]], list[list[Number]]]:
+def _matrix(c: Constants, theta: Sequence[Number], apart: Lower | None = None) -> tuple[Lower, Lower, Lower]:
     """C, and the sines and cosines of theta_i - theta_j: lower halves, without the diagonal for these two."""
-    pairs = [[sine_cosine(theta[i] - theta[j]) for j in range(i)] for i in range(c.n)]
+    pairs = [[sine_cosine(apart[i][j] if apart else theta[i] - theta[j]) for j in range(i)] for i in range(c.n)]
     sines, cosines = ([[pair[k] for pair in row] for row in pairs] for k in (0, 1))
     matrix = [
         [*(c.inertia[i][j] * cosines[i][j] + c.rotors[i][j] for j in range(i)), c.inertia[i][i] + c.rotors[i][i]]
@@ -250,9 +253,7 @@ def _matrix(c: Constants, theta: Sequence[Number]) -> tuple[list[list[Number]], 
     return matrix, sines, cosines
 
 
-def _forces(
-    c: Constants, theta: Sequence[Number], omega: Sequence[Number], cosines: list[list[Number]], t: Number
-) -> list[Number]:
+def _forces(c: Constants, theta: Sequence[Number], omega: Sequence[Number], cosines: Lower, t: Number) -> list[Number]:
     """Q - h of (E6), of all effects: N m for each rod."""
     right = _pulls(c, theta, t)
     for i, torque in enumerate(_joints(c, theta, omega, t)):
