@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -26,10 +26,19 @@ _SIZE: Final = "of the largest acceleration"
 # each of so many steps are enough.
 _SETTLED: Final = 128
 _STEPS: Final = 64
+_FALLEN: Final = 0.75  # of what it was: it falls
 # Of methods with a plateau: two numbers of fine steps a second, and how far off they may be in other chains than the
 # calm one, whose plateau it is.
 _FINE: Final = (2048, 4096)
 _PLATEAUS: Final = 10.0
+
+
+class _Measured(NamedTuple):
+    """Accelerations (n,) rad/s^2 that an engine has; how far off, and how far they may be, over the largest one."""
+
+    found: FloatArray
+    off: float
+    limit: float
 
 
 def _swing(random: np.random.Generator, n: int, **parts: float | FloatArray) -> Scene:
@@ -67,7 +76,7 @@ def is_the_same_system(its: Subject) -> Iterator[Reading]:
     for about, scene in known + [(name, make(random)) for name, make in _CHAINS.items()]:
         if about.startswith("rope") and refusal(its.engine, its.method, scene) is not None:
             continue  # it says so itself
-        off, limit = _settled(its, scene) if scene.n > 10 else _accelerations(its, scene, _STEPS)[1:]
+        _, off, limit = _settled(its, scene, _SETTLED if scene.n > 10 else _STEPS)
         yield Reading(off, limit, "" if off <= limit else _cause(its, off), about)
         if not off <= limit:
             return  # the other chains would say the same
@@ -90,23 +99,27 @@ def _early(its: Subject, scene: Scene, steps: int) -> State:
     return run.state()
 
 
-def _settled(its: Subject, scene: Scene) -> tuple[float, float]:
-    """How far the accelerations of a long chain are off, and may be.
+def _settled(its: Subject, scene: Scene, steps: int) -> _Measured:
+    """The accelerations of a solver that may want more steps to settle: those of the fewest that will do.
 
-    What falls with the number of steps in a span is no other system, but a solver on its way: then the limit is taken.
+    What falls with the number of steps in a span is no other system, but a solver on its way; where it is a long way,
+    the limit is taken. More steps have more rounding, which excuses nothing that does not fall.
     """
-    found, off, limit = _accelerations(its, scene, _SETTLED)
-    if off <= limit:
-        return off, limit
-    later, off_later, _ = _accelerations(its, scene, 4 * _SETTLED)
-    if not off_later < 0.5 * off:
-        return off, limit
+    first = before = last = _accelerations(its, scene, steps)
+    if first.off <= first.limit:
+        return first
+    for times in (2, 4, 8, 16, 32):
+        before, last = last, _accelerations(its, scene, times * steps)
+        if last.off <= min(last.limit, _FALLEN * first.off):
+            return last
+    if not last.off < _FALLEN * before.off:
+        return first
+    found = 2.0 * last.found - before.found
     exact = accelerations(scene, scene.angles, scene.rates)
-    return float(np.abs((4.0 * later - found) / 3.0 - exact).max() / np.abs(exact).max()), 0.5 * off
+    return _Measured(found, float(np.abs(found - exact).max() / np.abs(exact).max()), before.off)
 
 
-def _accelerations(its: Subject, scene: Scene, steps: int) -> tuple[FloatArray, float, float]:
-    """What the engine has, (n,) rad/s^2; how far that is off, and how far it may be, over the largest acceleration."""
+def _accelerations(its: Subject, scene: Scene, steps: int) -> _Measured:
     exact = accelerations(scene, scene.angles, scene.rates)
     size, fastest = float(np.abs(exact).max()), float(np.abs(scene.rates).max())
     pace = size + fastest**2
@@ -114,7 +127,7 @@ def _accelerations(its: Subject, scene: Scene, steps: int) -> tuple[FloatArray, 
     found, known = acceleration_at_start(its.engine, scene, its.method, pace, careful(its), steps)
     rounded = 50.0 * its.eps * max(fastest, 1.0) / longest_span(pace)
     off = float(np.abs(found - exact).max()) / size
-    return found, off if math.isfinite(off) else math.inf, _ACCELERATION + (10.0 * known + rounded) / size
+    return _Measured(found, off if math.isfinite(off) else math.inf, _ACCELERATION + (10.0 * known + rounded) / size)
 
 
 def _cause(its: Subject, off: float) -> str:
