@@ -167,6 +167,22 @@ def test_rows_and_columns_that_one_side_has_are_said(tmp_path):
         assert said in found.markdown()
 
 
+def test_a_result_that_is_lost_is_something_that_got_worse(tmp_path, capsys):
+    """A row that was there and is not: the command says so and fails. One more row is no loss."""
+    a, b = write(tmp_path / "a", {}, {"dt": 1e-2}), write(tmp_path / "b", {})
+    assert main(["compare", str(a), str(b)]) == 1
+    said = capsys.readouterr().out
+    assert "lost: double mujoco rk4 dt=0.01 n=2: only in " in said
+    assert "Lost: 1 row of the first that the second does not have." in said
+    assert main(["compare", str(b), str(a)]) == 0
+    gates = (
+        gate_file(tmp_path / "a.json", CHECK, dataclasses.replace(CHECK, method="euler")),
+        gate_file(tmp_path / "b.json"),
+    )
+    assert main(["compare", *map(str, gates)]) == 1
+    assert pb.compare(*gates).lost == ("euler converges",)
+
+
 def test_long_chains_of_one_scene_are_told_apart_by_their_links(tmp_path):
     rows = {"n": 1}, {"n": 10, "error_half": 1e-2}
     assert not pb.compare(write(tmp_path / "a", *rows), write(tmp_path / "b", *rows[::-1])).worse

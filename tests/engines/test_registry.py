@@ -160,3 +160,12 @@ def test_the_name_of_a_bundled_engine_is_not_to_be_had(registered):
     with pytest.raises(InputError, match="'mujoco' comes with pendbench; allowed: another name"):
         registered("mujoco", AnalyticEngine)
     assert engine("analytic").name == "analytic"
+
+
+def test_the_packages_that_an_engine_came_in_are_known():
+    assert registry.packages("mujoco") == ("mujoco-core", "mujoco")
+    assert registry.packages("pymunk") == ("pymunk",)
+    assert registry.packages("box2d") == ("pyb2d3",)  # what its extra wants
+    for name in ("analytic", "xpbd"):
+        with pytest.raises(InputError, match="comes with pendbench; allowed: an engine that has releases of its own"):
+            registry.packages(name)

@@ -33,13 +33,14 @@ def run(chosen: argparse.Namespace) -> int:
     say(*_lines(found), found.answer)
     if chosen.out is not None:
         say(f"Written: {chosen.out}/compare.md, {chosen.out}/compare.html")
-    return REGRESSION if found.worse else OK
+    return REGRESSION if found.worse or found.lost else OK
 
 
 def _lines(found: Comparison) -> list[str]:
-    """What got worse and what better, as many as a terminal can hold."""
+    """What was lost, what got worse and what better, as many as a terminal can hold."""
     from pendbench.commands.comparing import line_of
 
-    lines = [printable(line_of(each)) for each in (*found.worse, *found.better)]
+    lost = (f"lost: {each}: only in {found.a}" for each in found.lost)
+    lines = [*map(printable, lost), *(printable(line_of(each)) for each in (*found.worse, *found.better))]
     more = len(lines) - _MOST_LINES
     return lines if more <= 0 else [*lines[:_MOST_LINES], f"and {more} more"]

@@ -47,6 +47,11 @@ class Comparison:
         """What got worse."""
         return self.found.of("worse")
 
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """What `a` has and `b` does not: who lost a result cannot say that it is as good as it was."""
+        return self.found.gone
+
     @cached_property
     def answer(self) -> str:
         """The outcome in a few sentences, on one line."""

@@ -23,7 +23,7 @@ from pendbench.report.index import write_index
 from pendbench.report.page import Report
 from pendbench.report.tables import data_frame
 from pendbench.report.text import file_name
-from pendbench.report.write import write_report
+from pendbench.report.write import write_report, write_tables
 from pendbench.scene.scene import Scene, scene_of
 from pendbench.study.baseline import baseline_path, read_baseline, regressions, write_baseline
 from pendbench.study.kinds import kind
@@ -42,6 +42,7 @@ class Request:
 
     scenes: in place of the study's, each a `Scene` or what `load_scene` takes; then `out` is `results/NAME-SCENES`.
     changes: keys over those of the study's file. cluster: the address of a Dask cluster to run on, or `local`.
+    bare: write the tables and where they are from, and no report.
     """
 
     study: str | os.PathLike[str]
@@ -55,6 +56,7 @@ class Request:
     update_baseline: bool = False
     cluster: str | None = None
     changes: Mapping[str, Any] = field(default_factory=dict)
+    bare: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,10 @@ def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
     watcher = watcher or Silence()
     with alone_in(out, lambda: watcher.begin("waiting for another study in this folder", 1, 0)):
         report, motions = _run(plan, request, out, watcher, workers)
-        write_report(report, out, stage_of_study(motions))
+        if request.bare:
+            write_tables(report, out)
+        else:
+            write_report(report, out, stage_of_study(motions))
     if request.out is None:
         write_index(out.parent)
     cases = data_frame(report.cases)
@@ -152,7 +157,7 @@ def _run(plan: Plan, request: Request, out: Path, watcher: Watcher, workers: int
         unused = 0 if kept[0] else before
         title = options.title or plan.name
         report = Report(Results(plan.name, title, options.kind, found, options, facts, plan.quick, kept, unused))
-        return report, measure_motions(report.moving, runner)
+        return report, None if request.bare else measure_motions(report.moving, runner)
 
 
 def folder_of(out: object) -> Path | None:

@@ -32,6 +32,7 @@ def add_options(options: argparse.ArgumentParser) -> None:
     scenes.completer = scene_names  # type: ignore[attr-defined]
     options.add_argument("--jobs", type=int, metavar="N", help="worker processes (default: one per processor)")
     options.add_argument("--cluster", metavar="ADDRESS", help="run on this Dask cluster; `local` starts one here")
+    options.add_argument("--bare", action="store_true", help="write tables only: no report, no plots")
     options.add_argument("--check", action="store_true", help="fail where a result got worse than the study's baseline")
     options.add_argument("--fresh", action="store_true", help="run again what is already in the folder")
     options.add_argument("--update-baseline", action="store_true", help="make these results the study's baseline")
@@ -83,6 +84,7 @@ def _request(chosen: argparse.Namespace) -> Request:
         fresh=chosen.fresh,
         update_baseline=chosen.update_baseline,
         cluster=chosen.cluster,
+        bare=chosen.bare,
     )
 
 
@@ -92,10 +94,10 @@ def _study(request: Request) -> int:
 
     with StageBars() as bars:
         finished = run_request(request, bars)
-    return _tell(finished)
+    return _tell(finished, request.bare)
 
 
-def _tell(finished: Finished) -> int:
+def _tell(finished: Finished, bare: bool) -> int:
     from rich.console import Console
 
     from pendbench.report.terminal import summary_table
@@ -104,7 +106,8 @@ def _tell(finished: Finished) -> int:
     with console.capture() as shown:
         console.print(summary_table(finished.report))
         console.print(finished.report.answer, markup=False)
-    report = f"{shown.get()}Report: {finished.out / 'report.md'}"
+    written = f"Tables: {finished.out}" if bare else f"Report: {finished.out / 'report.md'}"
+    report = f"{shown.get()}{written}"
     say(*finished.notes, report, *_checked(finished), *_unused(finished))
     for line in finished.regressions:
         print(f"regression: {line}", file=sys.stderr)

@@ -6,9 +6,10 @@ without arguments, or a function, that gives an `Engine`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, entry_points, requires
 from typing import Any, Final, NamedTuple
 
 from pendbench.base.errors import InputError, MissingEngineError, choose, describe, printable
@@ -40,6 +41,8 @@ _BUNDLED: Final = {
 }
 # Those whose program comes with an extra of that package, of the same name.
 _EXTRAS: Final = frozenset(_BUNDLED) - {"analytic", "mujoco", "pymunk", "scipy", "xpbd"}
+# What their programs were called in earlier releases.
+_FORMERLY: Final = {"mujoco": ("mujoco",)}
 # Those that run where no engines are named; the others are many, and most step in Python or compile for long.
 _UNASKED: Final = frozenset({"analytic", "heyoka", "mujoco", "pinocchio", "pymunk"})
 _registered: dict[str, Factory] = {}
@@ -69,6 +72,21 @@ def only_by_name(name: str) -> bool:
 def is_foreign(name: str) -> bool:
     """Whether the engine is somebody else's, found through an entry point: nobody here has ever loaded it."""
     return name not in _registered and name not in _BUNDLED and name in entry_points(group=GROUP).names
+
+
+def packages(name: str) -> tuple[str, ...]:
+    """The packages in which an engine's program has come over time, today's first. Loads nothing.
+
+    Raises InputError for an unknown engine, and for one whose program is pendbench itself.
+    """
+    source = _source(name)
+    package = source.package
+    if name in _EXTRAS:
+        found = (re.match(r"([\w.-]+).*;.*extra == .(\w+).$", each) for each in requires("pendbench") or ())
+        package = next((its[1] for its in found if its and its[2] == name), None)
+    if package is None or package == "pendbench":
+        raise InputError(f"engine {name!r} comes with pendbench; allowed: an engine that has releases of its own")
+    return package, *_FORMERLY.get(name, ())
 
 
 def try_to_load(name: str) -> None:

@@ -69,6 +69,15 @@ class Styles:
         steps = {case.dt for own in groups.values() for case in own if case.dt is not None}
         return cls(methods, sorted(steps, reverse=True))
 
+    @staticmethod
+    def of_names(engine: str, methods: Sequence[str]) -> dict[str, dict[str, Any]]:
+        """How a line of each of an engine's methods is drawn that goes through all steps, by name."""
+        colours = shades(engine_hue(engine), len(methods))
+        return {
+            name: {"color": colours[i], "marker": _MARKERS[i % len(_MARKERS)], "linestyle": _DASHES[i % len(_DASHES)]}
+            for i, name in enumerate(methods)
+        }
+
     @property
     def engines(self) -> list[str]:
         """The engines, in the study's order."""

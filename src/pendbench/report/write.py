@@ -17,15 +17,20 @@ def write_report(report: Report, out: Path, stage: Stage | None = None) -> None:
 
     stage: what moves in report.html.
     """
-    for table in report.tables.values():
-        _write(out / f"{table.name}.csv", csv_text(table).encode())
+    write_tables(report, out)
     for plot in report.pictures:
         _write(out / "plots" / f"{plot.name}.png", plot.png)
-    _write(out / "provenance.json", provenance_json(report.results.provenance).encode())
     text = report.markdown()
     pictures = {f"plots/{plot.name}.png": plot.drawn for plot in report.pictures}
     _write(out / "report.html", html_page(text, report.answer, pictures, stage).encode())
     _write(out / "report.md", text.encode())
+
+
+def write_tables(report: Report, out: Path) -> None:
+    """Write a CSV file for each table, and provenance.json: all of it that programs read."""
+    for table in report.tables.values():
+        _write(out / f"{table.name}.csv", csv_text(table).encode())
+    _write(out / "provenance.json", provenance_json(report.results.provenance).encode())
 
 
 def _write(path: Path, content: bytes) -> None:
