@@ -293,3 +293,17 @@ def test_the_command_writes_the_files_of_all_scenes(tmp_path, monkeypatch):
     mjcf.main()
     assert sorted(file.name for file in (models / "mjcf").iterdir()) == ["double.xml", "single.xml"]
     assert (models / "mjcf" / "double.xml").read_text(encoding="utf-8") == mjcf.write_mjcf(load_scene("double"))
+
+
+def test_a_release_without_todays_editing_reads_the_same_model_as_a_file(monkeypatch):
+    """To the last digit, with effects that a file holds and one that it does not."""
+    scene = Scene.chain(
+        n=3, length=0.4, mass=0.3, angles=1.0, gravity=9.81, joint_damping=0.1, air_drag={"linear": 0.2}
+    )
+    edited = mjcf.compile_chain(scene)
+    monkeypatch.setattr(mjcf, "_EDITS", False)
+    read = mjcf.compile_chain(scene)
+    for name in ("body_mass", "body_inertia", "body_pos", "body_ipos", "jnt_axis", "dof_damping", "dof_armature"):
+        assert np.array_equal(getattr(edited, name), getattr(read, name)), name
+    assert read.opt.disableflags == edited.opt.disableflags
+    assert read.ngeom == 0

@@ -33,7 +33,14 @@ DEEPEST_FILE: Final = 496
 
 #: Swinging in the plane x-z, counter-clockwise positive for someone who has x to the right and z up.
 _AXIS: Final = (0.0, -1.0, 0.0)
-_DISABLED: Final = ("constraint", "contact", "spring", "damper", "actuation", "sensor", "autoreset", "gravity")
+#: Of these a release knows some: before 3.3 "passive" stood for springs and dampers, and nothing for "autoreset".
+_DISABLED: Final = tuple(
+    name
+    for name in ("constraint", "contact", "passive", "spring", "damper", "actuation", "sensor", "autoreset", "gravity")
+    if hasattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}")
+)
+#: Earlier releases have another model-editing API, or none: there a model is read as a file is.
+_EDITS: Final = tuple(map(int, mujoco.__version__.split(".")[:2])) >= (3, 7)
 #: The effects that a model holds, and what each needs of these. The others want forces computed while it runs.
 HELD: Final[Mapping[str, tuple[str, ...]]] = {
     "gravity": (),
@@ -102,7 +109,7 @@ def compile_chain(scene: Scene) -> mujoco.MjModel:
     """
     with alone(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        model = chain_spec(scene).compile()
+        model = chain_spec(scene).compile() if _EDITS else mujoco.MjModel.from_xml_string(_document(scene, drawn=False))
     model.body_inertia[1:] = [[link.inertia] * 3 for link in _links(scene)]
     return model
 
@@ -118,11 +125,16 @@ def write_mjcf(scene: Scene) -> str:
         raise InputError(f"scene {scene.name!r} has {scene.n} links; allowed in an MJCF file: at most {DEEPEST_FILE}")
     if forced := [name for name in scene.terms if name not in HELD]:
         raise InputError(f"scene {scene.name!r} calls for {forced[0]}, which an MJCF file cannot hold")
+    return _document(scene)
+
+
+def _document(scene: Scene, *, drawn: bool = True) -> str:
+    """The text of a file, of the effects that it can hold."""
     root = ET.Element("mujoco", model=printable(scene.name))
     root.append(ET.Comment(_COMMENT.format(advice=_HEAVY if acting.has_links(scene) else _LIGHT)))
     _add_options(root, scene)
     _add_custom(ET.SubElement(root, "custom"), scene)
-    _add_links(ET.SubElement(root, "worldbody"), scene)
+    _add_links(ET.SubElement(root, "worldbody"), scene, drawn)
     qpos, qvel = _text(joint_values(scene.angles)), _text(joint_values(scene.rates))
     ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="start", qpos=qpos, qvel=qvel)
     ET.indent(root, space=" ")
@@ -157,7 +169,7 @@ def _add_custom(parent: ET.Element, scene: Scene) -> None:
     ET.SubElement(parent, "numeric", name=MASS_UNIT, data=_text([mass_unit(scene)]))
 
 
-def _add_links(parent: ET.Element, scene: Scene) -> None:
+def _add_links(parent: ET.Element, scene: Scene, drawn: bool) -> None:
     hangs_at = 0.0
     for i, link in enumerate(_links(scene), start=1):
         parent = ET.SubElement(parent, "body", name=f"link{i}", pos=_text((0.0, 0.0, -hangs_at)))
@@ -168,7 +180,8 @@ def _add_links(parent: ET.Element, scene: Scene) -> None:
         for name in ("damping", "stiffness", "springref", "armature"):
             if value := getattr(link, name):
                 joint.set(name, _text([value]))
-        ET.SubElement(parent, "geom", fromto=_text((0.0, 0.0, 0.0, 0.0, 0.0, -link.length)))
+        if drawn:
+            ET.SubElement(parent, "geom", fromto=_text((0.0, 0.0, 0.0, 0.0, 0.0, -link.length)))
         hangs_at = link.length
 
 
@@ -224,6 +237,8 @@ def _disabled(scene: Scene) -> tuple[str, ...]:
     needs = {flag for name in scene.terms for flag in HELD.get(name, _ASKS)}
     if acting.is_pulled(scene):
         needs.add("gravity")
+    if not needs.isdisjoint(_ASKS):
+        needs.add("passive")
     return tuple(flag for flag in _DISABLED if flag not in needs)
 
 
