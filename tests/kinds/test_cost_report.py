@@ -39,6 +39,7 @@ HEADINGS = [
     "Appendix: what each method costs",
     "Appendix: how far to trust the timings",
     "Appendix: how it was measured",
+    "Appendix: what is proved of the truth",
     "Appendix: what the columns mean",
     "Appendix: where the numbers come from",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -264,6 +265,12 @@ def test_the_answer_is_read_off_the_tables():
     [priced] = [row for row in tables_of(section(page, "What an effect costs"))[0] if row["effect"] == "joint_damping"]
     assert priced["mujoco euler"] == "1.1\u00d7 (5.5 µs)"
     assert priced["mujoco rk4"] == "4\u00d7 ? (40 µs)"  # noise is marked, and in no sentence
+
+
+def test_what_is_proved_of_a_truth_that_was_compared_with_is_said():
+    said = section(made().markdown(), "Appendix: what is proved of the truth")
+    assert re.search(r"`damped_double`, from its own start, is proven to \de-\d\d rad until 5 s", said)
+    assert "kapitza" not in said  # it has no certificate
 
 
 def test_default_flags_are_an_effect_of_their_method():

@@ -191,6 +191,14 @@ def test_the_search_is_that_of_each_scene_and_method(folder):
     assert {row.case for row in report.tables["search"]} == set(asked) - {row.case for row in report.cases}
 
 
+def test_where_nothing_is_compared_with_the_truth_its_proof_is_no_matter(folder):
+    other = STUDY.replace('"upright.toml"', '"a01"').replace("upright = 20.0", "a01 = 60.0")
+    (folder / "proven.toml").write_text(other)
+    report, _ = found_by(folder, up_to(euler=0.3, rk4=0.7), "proven.toml")
+    assert "a01" in [row.scene.name for row in report.tables["scenes"]]
+    assert "what is proved" not in report.markdown()
+
+
 def test_kernels_are_compiled_before_any_case_runs(folder):
     _, oracle = found_by(folder, up_to(euler=0.3, rk4=0.7))
     assert list(oracle.stages)[:3] == ["what engines refuse", "kernels compiled", "cases"]

@@ -314,6 +314,21 @@ def test_wide_matrices_that_may_be_singular_prove_nothing():
         assert not all(x.is_finite() for x in found)
 
 
+def test_a_box_keeps_its_own_edges_until_they_are_too_alike():
+    """As they are, nothing is added to it: orthogonal ones make that of `heavy_tip` 3e5 times as large."""
+    from pendbench.truth.proof.place import _frame
+
+    def framed(edges):
+        turned = arb_mat([[arb(float(entry)) for entry in row] for row in edges])
+        return np.array([[float(entry) for entry in row] for row in _frame(turned, [arb(1), arb(1)]).tolist()])
+
+    edges = np.array([[1.0, 3.0], [0.0, 4.0]])
+    np.testing.assert_allclose(framed(edges), [[1.0, 0.6], [0.0, 0.8]], rtol=1e-15)
+    frame = framed(np.array([[1e-9, 2.0], [1.0, 1e9]]))
+    np.testing.assert_allclose(frame.T @ frame, np.eye(2), atol=1e-15)
+    assert abs(frame[1, 0]) == pytest.approx(1.0)  # along the longest
+
+
 def test_a_frame_does_not_decide_what_is_proved():
     """Any invertible frame holds the same box, only less tightly: here a bad one."""
     from pendbench.truth.proof.place import Place, spread

@@ -22,6 +22,7 @@ from pendbench.report.styles import Styles
 from pendbench.report.text import Safe, grid, markdown
 from pendbench.study.case import Case
 from pendbench.study.results import Results
+from pendbench.truth.proof.known import Proven, proven
 
 _UNSMOOTH: Final = 0.5
 
@@ -49,6 +50,7 @@ class Facts:
     spread_median: float
     spread_worst: float
     flags: bool
+    proven: Sequence[Proven]
 
 
 def facts(results: Results[Found], tables: dict[str, Table]) -> Facts:
@@ -77,6 +79,7 @@ def facts(results: Results[Found], tables: dict[str, Table]) -> Facts:
         spread_median=float(np.median(spreads)) if spreads else math.nan,
         spread_worst=max(spreads, default=math.nan),
         flags=any(row.effect == DEFAULTS for row in prices),
+        proven=proven(results.found.scenes),
     )
 
 

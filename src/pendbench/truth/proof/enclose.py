@@ -34,7 +34,7 @@ TOO_WIDE: Final = "it would need more than %d bits"
 def effort_of(bits: int) -> Effort:
     """An order and a low precision that suit: the step is about a third of the disc that is covered."""
     order = round(0.6 * bits)
-    return Effort(bits, order, 128, max(28, order // 4))
+    return Effort(bits, order, 128, max(44, order // 4))
 
 
 def other_effort(effort: Effort) -> Effort:

@@ -13,12 +13,15 @@ from pendbench.truth.proof.bounds import BITS, Bounds
 from pendbench.truth.proof.numbers import Number, precision
 from pendbench.truth.proof.polynomials import Effort, Path
 
+#: Edges of a box are too alike where the condition of their matrix is this: so much is lost of what is added to it.
+_ALIKE = 1e6
+
 
 @dataclass(frozen=True)
 class Place:
     """All states ``centre + frame r`` with ``|r_i| <= radii_i``.
 
-    centre: (2 n) exact. frame: a matrix (2 n, 2 n) of exact numbers, nearly orthogonal. radii: (2 n) upper bounds.
+    centre: (2 n) exact. frame: a matrix (2 n, 2 n) of exact numbers. radii: (2 n) upper bounds.
     """
 
     centre: list[Number]
@@ -88,7 +91,7 @@ def carried(place: Place, path: Path, bounds: Bounds, effort: Effort) -> Place |
         centre = [value.mid() for value in values]
     with precision(effort.small_bits):
         turned = _variation_at(path, bounds.length) * place.frame
-        frame = _orthogonal(turned, place.radii)
+        frame = _frame(turned, place.radii)
         back = frame.inv()
         kept = spread(back * turned, place.radii)
     with precision(BITS):
@@ -113,12 +116,19 @@ def _variation_at(path: Path, u: Number) -> Any:
     return value
 
 
-def _orthogonal(turned: Any, radii: Sequence[Number]) -> Any:
-    """A frame along the longest edges of the turned box. Any invertible one would do: doubles are good enough."""
+def _frame(turned: Any, radii: Sequence[Number]) -> Any:
+    """A frame for the turned box: its own edges, or where they have become too alike, orthogonal ones.
+
+    Any invertible one would do: doubles are good enough. The box's own edges hold it as it is, and nothing is added;
+    but those of a chaotic motion all turn in one direction. Orthogonal ones begin with its longest.
+    """
     from flint import arb, arb_mat
 
     matrix = np.array([[float(entry.mid()) for entry in row] for row in turned.tolist()])
-    sizes = np.array([float(r) for r in radii])
-    lengths = np.linalg.norm(matrix, axis=0) * (sizes / sizes.max() if sizes.max() > 0.0 else 1.0)
-    frame = np.linalg.qr(matrix[:, np.argsort(-lengths, kind="stable")])[0]
+    lengths = np.linalg.norm(matrix, axis=0)
+    frame = matrix / lengths
+    if not np.linalg.cond(frame) < _ALIKE:
+        sizes = np.array([float(r) for r in radii])
+        longest = np.argsort(-lengths * (sizes / sizes.max() if sizes.max() > 0.0 else 1.0), kind="stable")
+        frame = np.linalg.qr(matrix[:, longest])[0]
     return arb_mat([[arb(float(entry)) for entry in row] for row in frame])
