@@ -191,6 +191,22 @@ def test_it_goes_on_where_it_was(tmp_path):
 
 
 @with_flint
+def test_it_ends_at_its_memory_limit_and_goes_on_with_a_higher_one(tmp_path, capsys):
+    out, line = tmp_path / "a.npz", ["prove", "single", "--until", "0.5", "--out", str(tmp_path / "a.npz")]
+    assert main([*line, "--memory", "1"]) == 0  # less than Python takes
+    assert "memory limit" in capsys.readouterr().out
+    assert (tmp_path / "a.npz.part").is_file()
+    ended = read_proof(out, load_scene("single"))
+    assert ended.until < 0.5
+    assert main([*line, "--memory", "1e6"]) == 0
+    again = read_proof(out, load_scene("single"))
+    assert (again.until, again.reason) == (0.5, "")
+    assert np.array_equal(again.balls[: len(ended.t)], ended.balls)  # goes on, and does not begin anew
+    assert main(["prove", "single", "--check", str(out), "--memory", "1"]) == 0
+    assert "The other way ends there: it ran into its memory limit" in capsys.readouterr().out
+
+
+@with_flint
 def test_a_chain_that_stands_still_stays_there_and_one_that_stands_on_its_head_is_not_known_for_ever():
     rest = prove(load_scene("double").with_(angles=0.0), times=[1.0])
     assert np.all(np.abs(rest.theta_mid) + rest.theta_rad < 1e-40)
@@ -239,7 +255,7 @@ def test_the_command_proves_and_checks(tmp_path, capsys):
     assert main(["prove", "double", "--check", out]) == 2
     for wrong in (["--out", "a.npz", "--check", out], ["--out", str(tmp_path)], ["--out", f"{out}/b.npz"]):
         assert main(["prove", "single", *wrong]) == 2
-    for wrong in (["--out", "a.csv"], ["--out", ""], ["--until", "-1"], ["--within", "0"]):
+    for wrong in (["--out", "a.csv"], ["--out", ""], ["--until", "-1"], ["--within", "0"], ["--memory", "0.5"]):
         assert main(["prove", "single", *wrong]) == 2
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pendbench.scene.scene import Scene
 
 _SPAN: Final = (1e-9, 1e9, "s")
+_MEMORY: Final = (1.0, 1e9, "MB")
 _SAMPLES: Final = 1001
 _TELL_EVERY: Final = 100  # steps
 
@@ -28,6 +29,7 @@ def add_options(options: argparse.ArgumentParser) -> None:
     options.add_argument("--out", metavar="F.npz", help="the certificate (default: SCENE.proof.npz)")
     options.add_argument("--check", metavar="F.npz", help="check this certificate by another way; makes none")
     options.add_argument("--within", type=float, metavar="S", help="at most so much processor time; it can go on later")
+    options.add_argument("--memory", type=float, metavar="MB", help="at most so much memory; it can go on later")
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -56,7 +58,7 @@ def _prove(scene: Scene, chosen: argparse.Namespace) -> int:
     out = check_ending(f"{file_name(scene.name)}.proof.npz" if chosen.out is None else chosen.out)
     end = scene.duration if chosen.until is None else number("--until", chosen.until, _SPAN)
     keep = file_path(out, "--out").with_name(f"{out.name}.part")
-    proof = prove_at(scene, np.linspace(0.0, end, _SAMPLES).tolist(), keep, _within(chosen), _Teller())
+    proof = prove_at(scene, np.linspace(0.0, end, _SAMPLES).tolist(), keep, tell=_Teller(), **_limits(chosen))
     proof.save(out)
     if not proof.reason:
         keep.unlink(missing_ok=True)
@@ -79,7 +81,7 @@ def _check(scene: Scene, chosen: argparse.Namespace) -> int:
     until = math.inf if chosen.until is None else number("--until", chosen.until, _SPAN)
     say(f"{file} is whole, and of this scene, until {number_text(proof.until)} s")
     keep = file.with_name(f"{file.name}.check.part")
-    found = check_proof(proof, until, keep=keep, within=_within(chosen), tell=_Teller())
+    found = check_proof(proof, until, keep=keep, tell=_Teller(), **_limits(chosen))
     if not found.reason:
         keep.unlink(missing_ok=True)
     say(f"By another way ({found.how}): {found.agreed} of {found.looked_at} times agree, until {found.until:g} s")
@@ -90,8 +92,10 @@ def _check(scene: Scene, chosen: argparse.Namespace) -> int:
     return OK if math.isnan(found.first_apart) else REGRESSION
 
 
-def _within(chosen: argparse.Namespace) -> float:
-    return math.inf if chosen.within is None else number("--within", chosen.within, _SPAN)
+def _limits(chosen: argparse.Namespace) -> dict[str, float]:
+    within = math.inf if chosen.within is None else number("--within", chosen.within, _SPAN)
+    memory = math.inf if chosen.memory is None else 1e6 * number("--memory", chosen.memory, _MEMORY)
+    return {"within": within, "memory": memory}
 
 
 class _Teller:

@@ -34,6 +34,7 @@ def check_proof(
     *,
     keep: Path | None = None,
     within: float = math.inf,
+    memory: float = math.inf,
     tell: Callable[[float, float, int], object] | None = None,
 ) -> Checked:
     """Enclose the same motion by another way, and see that every ball has points in common with the proof's.
@@ -54,7 +55,8 @@ def check_proof(
     times = [t for t in proof.t.tolist() if t <= until]
     if not times:
         raise InputError(f"the proof says nothing of times until {until:g} s; allowed: a later time, or another proof")
-    found = enclose(proof.scene, times, form=Momenta, effort=effort, keep=keep, within=within, tell=tell)
+    limits = {"within": within, "memory": memory}
+    found = enclose(proof.scene, times, form=Momenta, effort=effort, keep=keep, tell=tell, **limits)
     apart = []
     for its, texts in zip(found.seen, proof.balls.tolist(), strict=False):
         if not all(a.overlaps(read_ball(b)) for a, b in zip([*its.theta, *its.omega], texts, strict=True)):

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from pendbench import __version__
 from pendbench.base.files import write_whole
+from pendbench.base.processes import memory_held
 from pendbench.scene.scene import Scene
 from pendbench.truth.proof.numbers import precision
 from pendbench.truth.proof.place import Place, at
@@ -28,6 +29,7 @@ _SPARE_BITS = 24
 _SAVE_EVERY = 20.0  # s
 
 TOO_LONG: Final = "it ran into its time limit; the same line, run again, goes on from here"
+TOO_LARGE: Final = "it ran into its memory limit; the same line with a higher one goes on from here"
 TOO_WIDE: Final = "it would need more than %d bits"
 
 
@@ -71,12 +73,14 @@ def enclose(
     effort: Effort | None = None,
     keep: Path | None = None,
     within: float = math.inf,
+    memory: float = math.inf,
     tell: Callable[[float, float, int], object] | None = None,
 ) -> Enclosed:
     """Enclose the motion at `times` (s, rising, from 0 on), as far as it can be.
 
     effort: the first to be tried; more is taken where angles are not known to AIM. keep: a file from which it goes on,
-    if it is of the same scene and times, and where it is kept. within: s of processor. tell: is told how far it is
+    if it is of the same scene and times, and where it is kept. within: s of processor. memory: bytes that the process
+    may hold, looked at after each step. tell: is told how far it is
     (s), of how much, and with how many bits.
     """
     keeper = _Keeper(keep, scene, times, form)
@@ -97,6 +101,8 @@ def enclose(
                 return _end(progress, progress.walk.reason)
             if spent > within:
                 return _end(progress, TOO_LONG)
+            if memory_held() > memory:
+                return _end(progress, TOO_LARGE)
             keeper.write_now_and_then(progress)
             if tell is not None:
                 tell(float(progress.walk.t), times[-1], progress.walk.effort.bits)

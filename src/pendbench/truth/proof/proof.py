@@ -114,15 +114,16 @@ def prove_at(
     times: Sequence[float],
     keep: Path | None = None,
     within: float = math.inf,
+    memory: float = math.inf,
     tell: Callable[[float, float, int], object] | None = None,
 ) -> Proof:
-    """The same at these times; what `keep`, `within` and `tell` do, `enclose` says."""
+    """The same at these times; what `keep`, `within`, `memory` and `tell` do, `enclose` says."""
     check_installed()
     from pendbench.truth.proof.enclose import enclose
     from pendbench.truth.proof.system import Rates, check_provable
 
     check_provable(scene)
-    found = enclose(scene, times, keep=keep, within=within, tell=tell)
+    found = enclose(scene, times, keep=keep, within=within, memory=memory, tell=tell)
     made: dict[str, str | int | float] = {
         "form": Rates.name,
         "bits": found.effort.bits,
