@@ -20,8 +20,8 @@ from pendbench.physics.kernels.ensemble import write_ensemble_accelerations
 from pendbench.physics.kernels.massless import inwards, write_accelerations
 from pendbench.physics.kernels.scratch import COSINE, SINE
 from pendbench.physics.kernels.table import ensemble_system_of, system_of
-from pendbench.physics.kernels.trigonometry import write_bends
 from pendbench.scene.scene import Effects, Scene
+from pendbench.solvers.trigonometry import write_bends
 
 SIZES: Final = (2, 10, 100, 1000, 10_000, 100_000)
 MANY: Final = (2, 10, 100)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from pendbench.base import compiled
-from pendbench.physics.kernels.trigonometry import cosine_sine
+from pendbench.solvers.trigonometry import cosine_sine
 
 ADD = "def add(x, y):\n    return x + y\n"
 

@@ -56,7 +56,9 @@ def test_state_holds_what_its_form_says_and_is_a_copy(name):
     shape = (3, 2) if method.form is Form.ENDS else (3,)
     start = [np.full(shape, float(k)) for k in range(3 if method.form is Form.MOMENTA else 2)]
     state = method.begin(*start)
-    held = {Form.RATES: ("q", "v"), Form.MOMENTA: ("q", "p"), Form.ENDS: ("points", "speeds")}[method.form]
+    held = {Form.RATES: ("q", "v"), Form.MOMENTA: ("q", "p"), Form.RODS: ("q", "v"), Form.ENDS: ("points", "speeds")}[
+        method.form
+    ]
     for given, kept in zip(start, held, strict=False):
         np.testing.assert_array_equal(getattr(state, kept), given)
         assert not np.shares_memory(getattr(state, kept), given)

@@ -71,6 +71,7 @@ class Method:
     effects: those it can simulate, None for all of its engine.
     plateau: the error that no step and no tolerance brings it below, rad after a second of a calm swing of two links,
     where that is more than rounding of doubles: soft joints, single precision. single: it is in single precision.
+    conserves: its formula keeps the energy at any step, which is else a sign that it is put back by hand.
     note: one line for the documentation.
     """
 
@@ -83,6 +84,7 @@ class Method:
     effects: frozenset[str] | None = None
     plateau: float = 0.0
     single: bool = False
+    conserves: bool = False
 
     def with_defaults(self, given: Mapping[str, float]) -> dict[str, float]:
         """The settings `given`, and the defaults of those that are not; one without either is left out."""

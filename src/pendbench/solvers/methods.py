@@ -24,6 +24,7 @@ class Form(Enum):
 
     RATES = "angles and rates"  # begin(q, v); state.q, state.v
     MOMENTA = "angles and momenta"  # begin(q, p, v); state.q, state.p
+    RODS = "the rods in the plane"  # begin(q, v); state.q, state.v, written after each call
     ENDS = "the rods' ends in the plane"  # begin(points, speeds); state.points, state.speeds and state.turns
 
 
@@ -34,7 +35,8 @@ class FixedStep:
     begin: copies the start, arrays (d,) or (n, 2), into a state that holds all that is kept from step to step.
     advance(system, state, first, dt, steps): take the steps from number `first` on, each of dt (s), the one with number
     0 at time 0, and return how many could be taken. order: what it claims. note: a line for the documentation.
-    stuck and remedy: what to say where a step could not be taken, and what would help.
+    conserves: its formula keeps the energy. stuck and remedy: what to say where a step could not be taken, and what
+    would help.
     """
 
     name: str
@@ -46,6 +48,7 @@ class FixedStep:
     stuck: str = ""
     remedy: str = ""
     substeps: bool = False
+    conserves: bool = False
 
 
 _added: dict[str, FixedStep] = {}

@@ -24,8 +24,10 @@ _FIXED: Final = fixed_step_methods()
 
 
 def _described(method: FixedStep) -> Method:
-    known = _GRAVITY if method.form is Form.ENDS else None
-    return Method(order=method.order, note=method.note, substeps=method.substeps, effects=known)
+    known = _GRAVITY if method.form in (Form.ENDS, Form.RODS) else None
+    return Method(
+        order=method.order, note=method.note, substeps=method.substeps, effects=known, conserves=method.conserves
+    )
 
 
 _METHODS: Final = {

@@ -15,6 +15,7 @@ from pendbench.physics.geometry import positions, velocities
 from pendbench.physics.kernels.table import momenta_of, rates_of, series_system_of, system_of
 from pendbench.scene.scene import Scene
 from pendbench.solvers import adaptive, control, outcome, taylor
+from pendbench.solvers.closing import chain_of
 from pendbench.solvers.compensated import sum_from
 from pendbench.solvers.dop853 import DOP853
 from pendbench.solvers.methods import FixedStep, Form
@@ -59,6 +60,18 @@ class _Momenta:
         return State(self.state.q.copy(), self._rates.copy())
 
 
+class _Rods:
+    """The rods in the plane, and the angles and rates that they leave."""
+
+    def __init__(self, scene: Scene, method: FixedStep) -> None:
+        check_plain(scene, method.name)
+        self.system = chain_of(scene.masses, scene.lengths, scene.effects.gravity or 0.0)
+        self.state = method.begin(scene.angles, scene.rates)
+
+    def now(self, taken: int) -> State:  # noqa: ARG002
+        return State(self.state.q.copy(), self.state.v.copy(), 0.0)
+
+
 class _Ends:
     """The rods' ends in the plane, and what they say of angles and rates."""
 
@@ -100,6 +113,7 @@ class _Variables(Protocol):
 _VARIABLES: Final[Mapping[Form, Callable[[Scene, FixedStep], _Variables]]] = {
     Form.RATES: _Rates,
     Form.MOMENTA: _Momenta,
+    Form.RODS: _Rods,
     Form.ENDS: _Ends,
 }
 

@@ -181,7 +181,8 @@ def balances_its_energy(its: Subject) -> Iterator[Reading]:
         found = _climb_or_run(its, scene)
         errors = found.errors(_energy_error(scene))
         yield _deficit(its, found.steps, errors, "energy", about)
-        if about == "nothing damps" and not its.adaptive:
+        conserves = its.engine.methods[its.method].conserves
+        if about == "nothing damps" and not (its.adaptive or conserves):
             yield from _too_good(scene, found, errors)
 
 

@@ -9,7 +9,7 @@ from pendbench.base.compiled import inlined
 from pendbench.physics.kernels import laws
 from pendbench.physics.kernels.scratch import CARRIED, COSINE, PUSHED, SINE, SPEED_X, SPEED_Y
 from pendbench.physics.kernels.system import LinkSystem, System
-from pendbench.physics.kernels.trigonometry import write_bends, write_directions
+from pendbench.solvers.trigonometry import write_bends, write_directions
 
 
 @inlined

@@ -13,9 +13,9 @@ import numpy as np
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import inlined
 from pendbench.physics.acting import check_plain
-from pendbench.physics.kernels.trigonometry import FAR, cosine_sine, direction, rounded_bend
 from pendbench.scene.scene import Scene
 from pendbench.solvers.copying import copy_rows
+from pendbench.solvers.trigonometry import FAR, cosine_sine, direction, rounded_bend
 
 
 class EnsembleSystem(NamedTuple):

@@ -12,7 +12,7 @@ from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import chosen_by_type, inlined
 from pendbench.physics.kernels import laws
 from pendbench.physics.kernels.scratch import FORCE_ACROSS, FORCE_ALONG, TORQUE
-from pendbench.physics.kernels.trigonometry import direction
+from pendbench.solvers.trigonometry import direction
 
 
 def write_forces(system: Any, t: float, theta: FloatArray, omega: FloatArray, cosine: int, sine: int) -> None:

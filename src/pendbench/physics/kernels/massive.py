@@ -10,7 +10,7 @@ from pendbench.base.compiled import inlined
 from pendbench.physics.kernels import forces, laws
 from pendbench.physics.kernels.scratch import COSINE, FORCE_ACROSS, FORCE_ALONG, OWN, PASSED, SINE, TURNED, WHIRL
 from pendbench.physics.kernels.system import LinkSystem
-from pendbench.physics.kernels.trigonometry import direction, write_bends
+from pendbench.solvers.trigonometry import direction, write_bends
 
 # All inertias are multiples of a common factor, whose inverse is not needed until they are used: no link has to wait
 # for the division of the link before it. The factor is taken out where it has become large or small.

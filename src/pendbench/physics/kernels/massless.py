@@ -21,7 +21,7 @@ from pendbench.physics.kernels.scratch import (
     WHOLE,
 )
 from pendbench.physics.kernels.system import System
-from pendbench.physics.kernels.trigonometry import direction, write_bends
+from pendbench.solvers.trigonometry import direction, write_bends
 
 # The elimination's fractions are reduced where they have become large. To ask at every fourth link will do: each link
 # multiplies them by 1 + the ratio of two masses, and four of these make 1e200 at most, since masses end at 1e50.

@@ -13,9 +13,9 @@ import numpy as np
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import inlined
 from pendbench.physics.acting import check_plain
-from pendbench.physics.kernels.trigonometry import direction, rounded_bend
 from pendbench.scene.scene import Scene
 from pendbench.solvers.convolution import convolution, factors
+from pendbench.solvers.trigonometry import direction, rounded_bend
 
 # The products of each joint, left factor and right factor, a lane for each.
 _JOINT_LANES = 12

@@ -8,8 +8,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from pendbench.physics.kernels import trigonometry
-from pendbench.physics.kernels.trigonometry import FAR
+from pendbench.solvers import trigonometry
+from pendbench.solvers.trigonometry import FAR
 from support.kernels import called
 
 cosine_sine, direction, write_bends = map(

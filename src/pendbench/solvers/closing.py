@@ -1,0 +1,188 @@
+"""Rods that close: where the rods of a chain point after an implicit step, and what pulls in them, in O(n).
+
+Every implicit method here asks the same of a step. Its formula says what rod i would be if no rod pulled: q_i. The pull
+in a rod, f_i = T_i p_i, moves the masses at its ends, so what is left has to be a rod of its own length:
+
+    l_i u(theta_i) = q_i - (c_i + c_(i+1)) f_i + c_(i+1) f_(i+1) + c_i f_(i-1)         c_(i+1) = 1/m_i, c_1 = 0
+
+u(theta) = (sin theta, -cos theta), and p_i = u at the angle that lies a share w of the way from the old to the new one.
+The unknowns are an angle and a pull for each rod: rods are whole at every iterate, turns are followed by themselves,
+and Newton's method has blocks of 2 x 2 where coordinates and tensions would make them 3 x 3. Eliminating rod by rod
+leaves for the change of the pull df_i
+
+    (S_i + l_i / (w T_i) t_i p'_i^T) df_i = r_i + c_(i+1) df_(i+1)
+
+where t and p' are u and p turned by a quarter; the inverse of the matrix, multiplied out, has no pole at T = 0:
+
+    (w T adj(S) + l p u^T) / (w T det S + l u^T S p)                                            equations.md, (E59)
+
+The chain is eliminated from both ends towards its middle: while one end waits for a result, the other is computed.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import compiled, inlined
+from pendbench.solvers.trigonometry import write_directions
+
+_MOST_ITERATIONS = 12
+#: A change of angle, rad, that no iteration recovers from; and one so small that, where it no longer falls, digits end.
+_LOST, _ROUNDING = 30.0, 1e-7
+_TURN = 2.0 * np.pi
+
+# The rows of `Room.rows`: see there.
+WANTED_X, WANTED_Y, ANGLE, PULL, ROD_Y, ROD_X, ALONG_Y, ALONG_X, FORCE_X, FORCE_Y, SPARE, GUESS = range(12)
+
+# What is kept of a rod: the inverse matrix (2, 2), the right side, and the two factors that turn it into an angle.
+_KEPT = 8
+
+
+class Chain(NamedTuple):
+    """couplings (n + 1,): 0, then the masses' inverses, 1/kg; lengths (n,) m; gravity m/s^2."""
+
+    couplings: FloatArray
+    lengths: FloatArray
+    gravity: float
+
+
+def chain_of(masses: FloatArray, lengths: FloatArray, gravity: float) -> Chain:
+    """A chain of masses (n,) kg on rods (n,) m."""
+    return Chain(np.concatenate([[0.0], 1.0 / masses]), lengths.copy(), float(gravity))
+
+
+class Room(NamedTuple):
+    """Where a step is computed. One thread, one chain.
+
+    rows (12, n + 2): WANTED, what a rod would be without pulls, m; ANGLE, rad, and PULL, kg m: the guess, then the
+    answer; ROD and ALONG, unit vectors of the rods and of their pulls; FORCE, kg m, of rod i at place i + 1, with 0 at
+    both ends; SPARE, and GUESS of the angles. kept (n, 8).
+    """
+
+    rows: FloatArray
+    kept: FloatArray
+
+
+def room_for(n: int) -> Room:
+    """Room for n rods."""
+    return Room(np.zeros((12, n + 2)), np.empty((n, _KEPT)))
+
+
+@inlined
+def write_rods(angles: FloatArray, rows: FloatArray, row: int) -> None:
+    """Write the unit vectors of angles (n,) into two rows: first y, -cos, then x, sin."""
+    write_directions(angles, rows, row, row + 1)
+    for i in range(len(angles)):
+        rows[row, i] = -rows[row, i]
+
+
+@inlined
+def _write_forces(rows: FloatArray, angles: FloatArray, share: float, along: int) -> None:
+    """From the angles before (n,) and the iterate: the rods, the directions of their pulls, and the pulls."""
+    n = len(angles)
+    write_rods(rows[ANGLE, :n], rows, ROD_Y)
+    if share < 1.0:
+        for i in range(n):
+            rows[SPARE, i] = angles[i] + share * (rows[ANGLE, i] - angles[i])
+        write_rods(rows[SPARE, :n], rows, ALONG_Y)
+    for i in range(n):
+        rows[FORCE_X, i + 1] = rows[PULL, i] * rows[along + 1, i]
+        rows[FORCE_Y, i + 1] = rows[PULL, i] * rows[along, i]
+
+
+_Carried = tuple[float, float, float, float, float, float]
+
+
+@inlined
+def _eliminate(chain: Chain, room: Room, along: int, share: float, i: int, out: float, carried: _Carried) -> _Carried:
+    """Eliminate rod i towards a neighbour behind the coupling `out`; carried: S's part of the rods before, and r's."""
+    couplings, rows, kept = chain.couplings, room.rows, room.kept
+    a, length, t = couplings[i] + couplings[i + 1], chain.lengths[i], share * rows[PULL, i]
+    x, y, rod_x, rod_y = rows[along + 1, i], rows[along, i], rows[ROD_X, i], rows[ROD_Y, i]
+    s_xx, s_xy, s_yx, s_yy, r_x, r_y = carried
+    r_x += rows[WANTED_X, i] - length * rod_x - a * rows[FORCE_X, i + 1]
+    r_y += rows[WANTED_Y, i] - length * rod_y - a * rows[FORCE_Y, i + 1]
+    r_x += couplings[i + 1] * rows[FORCE_X, i + 2] + couplings[i] * rows[FORCE_X, i]
+    r_y += couplings[i + 1] * rows[FORCE_Y, i + 2] + couplings[i] * rows[FORCE_Y, i]
+    s_xx, s_xy, s_yx, s_yy = a - s_xx, -s_xy, -s_yx, a - s_yy
+    k_x, k_y = s_xx * x + s_xy * y, s_yx * x + s_yy * y
+    inverse = 1.0 / (t * (s_xx * s_yy - s_xy * s_yx) + length * (rod_x * k_x + rod_y * k_y))
+    t, length = t * inverse, length * inverse
+    c_xx, c_xy = t * s_yy + length * x * rod_x, length * x * rod_y - t * s_xy
+    c_yx, c_yy = length * y * rod_x - t * s_yx, t * s_xx + length * y * rod_y
+    kept[i, 0], kept[i, 1], kept[i, 2], kept[i, 3] = c_xx, c_xy, c_yx, c_yy
+    kept[i, 4], kept[i, 5], kept[i, 6], kept[i, 7] = r_x, r_y, k_x * inverse, k_y * inverse
+    square = out * out
+    g_x, g_y = out * (c_xx * r_x + c_xy * r_y), out * (c_yx * r_x + c_yy * r_y)
+    return square * c_xx, square * c_xy, square * c_yx, square * c_yy, g_x, g_y
+
+
+@inlined
+def _substitute(
+    room: Room, along: int, i: int, out: float, x: float, y: float, worst: float
+) -> tuple[float, float, float]:
+    """Change rod i, whose neighbour's pull behind the coupling `out` changed by (x, y); its own, and the worst turn."""
+    rows, kept = room.rows, room.kept
+    r_x, r_y = kept[i, 4] + out * x, kept[i, 5] + out * y
+    x, y = kept[i, 0] * r_x + kept[i, 1] * r_y, kept[i, 2] * r_x + kept[i, 3] * r_y
+    turn = kept[i, 6] * r_y - kept[i, 7] * r_x
+    rows[ANGLE, i] += turn
+    rows[PULL, i] += rows[along + 1, i] * x + rows[along, i] * y
+    size = abs(turn)
+    return x, y, (worst if size <= worst else size)  # nan is kept
+
+
+@inlined
+def _iterate(chain: Chain, room: Room, angles: FloatArray, share: float) -> float:
+    """One of Newton's steps; returns the largest change of an angle, rad."""
+    couplings, n = chain.couplings, len(angles)
+    middle = n // 2
+    along = ROD_Y if share == 1.0 else ALONG_Y
+    _write_forces(room.rows, angles, share, along)
+    left = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    right = left
+    for k in range(middle):
+        left = _eliminate(chain, room, along, share, k, couplings[k + 1], left)
+        if k < n - 1 - middle:
+            right = _eliminate(chain, room, along, share, n - 1 - k, couplings[n - 1 - k], right)
+    s_xx, s_xy, s_yx, s_yy = left[0] + right[0], left[1] + right[1], left[2] + right[2], left[3] + right[3]
+    both = (s_xx, s_xy, s_yx, s_yy, left[4] + right[4], left[5] + right[5])
+    _eliminate(chain, room, along, share, middle, 0.0, both)
+    x, y, worst = _substitute(room, along, middle, 0.0, 0.0, 0.0, 0.0)
+    right_x, right_y = x, y
+    for k in range(middle):
+        i = middle - 1 - k
+        x, y, worst = _substitute(room, along, i, couplings[i + 1], x, y, worst)
+        if k < n - 1 - middle:
+            i = middle + 1 + k
+            right_x, right_y, worst = _substitute(room, along, i, couplings[i], right_x, right_y, worst)
+    return worst
+
+
+@compiled
+def close(chain: Chain, room: Room, angles: FloatArray, share: float, tolerance: float) -> bool:
+    """Find the angles and pulls that close the chain, from the guess in `room`; False where they are not found.
+
+    angles (n,) rad: those before the step. share: w above. Ends with a change of the angles of at most `tolerance`
+    (rad), so what is left is of the order of its square. A rod that went round more often than its guess is turned
+    back: a direction says nothing of full turns, the motion does. Leaves the rods in `room`.
+    """
+    rows, n, before = room.rows, len(angles), np.inf
+    for i in range(n):
+        rows[GUESS, i] = rows[ANGLE, i]
+    for count in range(_MOST_ITERATIONS):
+        worst = _iterate(chain, room, angles, share)
+        if worst <= tolerance or before <= worst < _ROUNDING:
+            break
+        if not worst < _LOST or (count > 2 and worst > before):
+            return False
+        before = worst
+    else:
+        return False
+    for i in range(n):
+        rows[ANGLE, i] -= _TURN * np.round((rows[ANGLE, i] - rows[GUESS, i]) / _TURN)
+    write_rods(rows[ANGLE, :n], rows, ROD_Y)
+    return True
