@@ -94,7 +94,7 @@ def test_euler_follows_stiff_damping_with_steps_far_longer():
     assert after(stiff, "euler", 1e-3, 2000).theta[0] == pytest.approx(1.49608677, abs=1e-8)
 
 
-@pytest.mark.skipif("discrete" not in ENGINE.methods, reason="new in MuJoCo 4.0.1")
+@pytest.mark.skipif("discrete" not in ENGINE.methods, reason="new in MuJoCo 3.13")
 def test_discrete_is_euler_with_the_spring_and_the_damper_of_the_end_of_the_step():
     spring, damper, h = 40.0, 3.0, 1e-2
     effects = Effects(gravity=9.81, joint_stiffness=spring, joint_damping=damper)
@@ -109,7 +109,7 @@ def test_discrete_is_euler_with_the_spring_and_the_damper_of_the_end_of_the_step
     assert found.omega[0] == pytest.approx(omega, rel=1e-12)
 
 
-@pytest.mark.skipif("discrete" not in ENGINE.methods, reason="new in MuJoCo 4.0.1")
+@pytest.mark.skipif("discrete" not in ENGINE.methods, reason="new in MuJoCo 3.13")
 def test_discrete_stays_where_a_stiff_spring_throws_euler_out():
     stiff = dataclasses.replace(chain(2, angle=1.0), effects=Effects(joint_stiffness=1e5))
     calm, wild = (after(stiff, method, 1e-2, 100) for method in ("discrete", "euler"))

@@ -14,7 +14,7 @@ from pendbench.engines.mujoco.run import Run
 from pendbench.engines.protocol import Mapped, Method, Setting, Simulation, State, needed_step
 from pendbench.scene.scene import Scene
 
-# New in MuJoCo 4.0.1: with an older one there is no such method, and who asks for it is told which there are.
+# New in MuJoCo 3.13: with an older one there is no such method, and who asks for it is told which there are.
 _DISCRETE: Final = getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", None)
 _INTEGRATORS: Final = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
