@@ -176,6 +176,8 @@ def test_the_command_writes_what_python_writes(tmp_path, capsys):
         (["single", "--butterfly", "many"], "--butterfly is 'many'; allowed: a whole number"),
         (["single", "--butterfly", "3", "--run", "mujoco"], "allowed: one of them"),
         (["single", "--gif", "."], "--gif .: is a folder"),
+        (["single", "--gif", "x.png"], "--gif x.png: allowed: a name that ends in .gif"),
+        (["single", "--strip", "x.gif"], "--strip x.gif: allowed: a name that ends in .png"),
         (["single", "--out", "a", "--gif", "./a"], "--gif a: is --out, too; allowed: a file of its own"),
         (["single", "double"], "'double' after 'single'"),
     ],

@@ -78,10 +78,20 @@ def _show_flips(scene: Scene, chosen: argparse.Namespace, wanted: dict[str, Path
 
 
 def _wanted(scene: Scene, chosen: argparse.Namespace) -> dict[str, str | None]:
-    """Which files were asked for, by kind; a page where nothing was."""
+    """Which files were asked for, by kind; a page where nothing was.
+
+    Raises `InputError` for a picture with another kind's ending; one without an ending, as a device has, is none.
+    """
+    from pathlib import Path
+
+    from pendbench.base.strict import shown_path
     from pendbench.report.text import file_name
 
     given = {kind: getattr(chosen, kind) for kind in ("out", *_PICTURES)}
+    for kind in _PICTURES:
+        ending, allowed = Path(given[kind] or "").suffix, ".png" if kind == "strip" else f".{kind}"
+        if ending and ending.lower() != allowed:
+            raise InputError(f"--{kind} {shown_path(given[kind])}: allowed: a name that ends in {allowed}")
     return {kind: out for kind, out in given.items() if out is not None} or {"out": f"{file_name(scene.name)}.html"}
 
 
