@@ -168,6 +168,7 @@ def test_the_command_writes_what_python_writes(tmp_path, capsys):
         (["single", "--run", "mujoco:rk4:fast"], "has the step 'fast'"),
         (["single", "--run", "mujoco:rk4:1:2"], "allowed: an engine, then"),
         (["single", "--run", "mujoco:rk4:-1"], "-1"),
+        (["single", "--run", "analytic:rk4:1e-12"], "takes 1e+13 steps to be seen; allowed: 1e-06 s and more"),
         (["single", "--run", "analytic:adaptive:0.1"], "chooses its steps"),
         (["single", "--run", ""], "--run is ''"),
         (["single", "--out", "."], "--out .: is a folder"),

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _RUN: Final = "an engine, then if need be its method and its step in s: mujoco:rk4:0.001"
 
+_MOST_STEPS: Final = 1e7  # at five links some 3 s of our RK4, a minute of MuJoCo's
 _PICTURES: Final = {"gif": "a film", "mp4": "a film, by ffmpeg", "strip": "six moments side by side, PNG"}
 
 
@@ -125,7 +126,11 @@ def _case(scene: Scene, text: str) -> Case:
     if len(rest) > 2 or not name:
         raise InputError(f"--run is {text!r}; allowed: {_RUN}")
     method, step = (*rest, "", "")[:2]
-    return case_of(scene, name, method or None, _step(text, step) if step else None)
+    dt = _step(text, step) if step else None
+    if dt is not None and scene.duration > _MOST_STEPS * dt:
+        least = f"{scene.duration / _MOST_STEPS:.2g} s and more"
+        raise InputError(f"--run {text!r} takes {scene.duration / dt:.1g} steps to be seen; allowed: {least}")
+    return case_of(scene, name, method or None, dt)
 
 
 def _step(text: str, step: str) -> float:
