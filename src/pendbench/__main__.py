@@ -71,7 +71,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if "_ARGCOMPLETE" in os.environ:
         _complete()
     given = list(sys.argv[1:] if arguments is None else arguments)
-    return exit_code(lambda: _run(given))
+    return exit_code(lambda: _run(given), lambda: _keeps(given))
+
+
+def _keeps(given: Sequence[str]) -> bool:
+    """Whether the verb keeps what it has finished; one that does not has KEEPS = False."""
+    return bool(getattr(_command(given[0]), "KEEPS", True)) if given and given[0] in verbs() else True
 
 
 def _run(given: Sequence[str]) -> int:

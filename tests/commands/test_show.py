@@ -256,3 +256,13 @@ def test_the_page_of_real_runs_moves_and_is_silent(short, tmp_path):
         seen.page.wait_for_function("() => pendbench.clock.time > 0.1")
         assert seen.complaints == []
         assert len(seen.requests) == 1
+
+
+@pytest.mark.parametrize("verb", ["show", "truth"])
+def test_what_keeps_nothing_does_not_say_that_it_does(verb, monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pendbench.scene.scene.load_scene", stopped)
+    assert main([verb, "single"]) == 130
+    assert capsys.readouterr().err == "\nstopped; the same line begins anew\n"

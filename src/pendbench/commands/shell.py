@@ -15,6 +15,7 @@ from typing import Final, NoReturn
 
 from pendbench.base.errors import InputError, choose, printable
 
+_KEPT: Final = "what was finished is kept"
 OK, REGRESSION, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 _TYPES: Final = {"int": "a whole number", "float": "a number"}
 _ILL_TYPED: Final = re.compile(r"argument (\S+): invalid (int|float) value: (.*)", re.DOTALL)  # argparse's own words
@@ -42,8 +43,8 @@ def chosen(options: argparse.ArgumentParser, arguments: Sequence[str]) -> argpar
     return found
 
 
-def exit_code(work: Callable[[], int]) -> int:
-    """Do the work of a command. Whatever goes wrong is one line on standard error."""
+def exit_code(work: Callable[[], int], keeps: Callable[[], bool] = lambda: True) -> int:
+    """Do the work of a command, which keeps what was finished or not. What goes wrong is one line on standard error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that knows few letters shows others as escapes
             stream.reconfigure(errors="backslashreplace")
@@ -52,12 +53,13 @@ def exit_code(work: Callable[[], int]) -> int:
     except InputError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
-        print("\nstopped; what was finished is kept: run the same line again to go on", file=sys.stderr)
+        kept = f"{_KEPT}: run the same line again to go on" if keeps() else "the same line begins anew"
+        print(f"\nstopped; {kept}", file=sys.stderr)
         return INTERRUPTED
     except MemoryError:
-        return _refuse("not enough memory; what was finished is kept")
+        return _refuse(f"not enough memory{f'; {_KEPT}' if keeps() else ''}")
     except OSError as error:
-        return _refuse(f"{error}; what was finished is kept")
+        return _refuse(f"{error}{f'; {_KEPT}' if keeps() else ''}")
 
 
 def _refuse(message: str) -> int:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pendbench.scene.scene import Scene
     from pendbench.study.case import Case
 
+KEEPS: Final = False
 _RUN: Final = "an engine, then if need be its method and its step in s: mujoco:rk4:0.001"
 
 _MOST_STEPS: Final = 1e7  # at five links some 3 s of our RK4, a minute of MuJoCo's

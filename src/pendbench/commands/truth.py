@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pendbench.scene.scene import Scene
 
 _SPAN: Final = (1e-9, 1e9, "s")
+KEEPS: Final = False
 _MOST_ANGLES: Final = 10_000_000  # of all links and times
 
 
