@@ -165,14 +165,14 @@ def test_damped_methods_pass_the_whip_at_the_step_of_a_picture(n: int, method: s
     assert run.status == "ok", run.reason
     left = (energy(scene, run.theta, run.omega) - energy(scene, scene.angles, scene.rates)) / energy_scale(scene)
     rise = (left - np.minimum.accumulate(left)).max()
-    # Measured: none, and 0.2 % to 0.5 %.
-    assert rise <= {"implicit_euler": 1e-12, "bdf2": 0.01}[method]
+    # Measured: none, and 0.2 % to 1 % in ropes of 30 to 5000 links; what follows a crack is chaotic.
+    assert rise <= {"implicit_euler": 1e-12, "bdf2": 0.03}[method]
     assert left.max() < 1e-6
     assert left[-1] > -0.4
 
 
 def test_second_order_keeps_what_first_order_damps() -> None:
-    """Until the whip cracks, 1.3 s: measured 0.4 % against 11 %."""
+    """Until the whip cracks, 1.3 s: measured 0.3 % to 0.5 % against 11 %."""
     scene, lost = rope(100), {}
     for method in DAMPED:
         run = simulate(scene, "analytic", method, FRAME, [1.3])
