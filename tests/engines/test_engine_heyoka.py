@@ -189,4 +189,4 @@ def test_without_heyoka_the_message_is_the_command_that_brings_it(monkeypatch):
 
 def test_pyproject_has_the_extras_that_messages_name():
     project = tomllib.loads(Path(__file__).parents[2].joinpath("pyproject.toml").read_text())["project"]
-    assert set(project["optional-dependencies"]) & set(registry._BUNDLED) >= registry._EXTRAS
+    assert set(project["optional-dependencies"]) & set(registry._BUNDLED) >= set(registry._BUNDLED) - registry._ALONG

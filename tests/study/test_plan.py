@@ -14,7 +14,7 @@ from pendbench.base.errors import InputError, MissingEngineError
 from pendbench.base.strict import MAX_LINES, read_toml, validate
 from pendbench.engines.registry import engine, engine_names, only_by_name
 from pendbench.scene.scene import load_scene
-from pendbench.study.cases import is_installed
+from pendbench.study.absent import why_absent
 from pendbench.study.kinds import kind
 from pendbench.study.plan import Plan, find_study, load_plan
 from support.writing import text, toml
@@ -185,7 +185,7 @@ def test_every_bundled_study_has_a_plan(name, quick):
 def test_a_study_file_needs_only_its_scenes(write):
     plan = load_plan(write('kind = "stability"\nscenes = ["double", "fast_spin"]'))
     assert (plan.name, plan.options.title) == ("mine", None)
-    installed = {name for name in engine_names() if is_installed(name) and not only_by_name(name)}
+    installed = {name for name in engine_names() if not only_by_name(name) and not why_absent([name], apart=False)}
     assert {case.engine for case in plan.cases} == installed
     for name in installed:
         found = {(case.method, case.dt) for case in plan.cases if (case.scene.name, case.engine) == ("double", name)}
@@ -519,16 +519,17 @@ def test_a_study_with_some_bytes_changed_is_a_plan_or_one_line(tmp_path, data):
 
 
 def test_an_optional_engine_that_is_not_installed_is_left_out_and_said(tmp_path, monkeypatch):
-    from pendbench.study import cases as module
+    from pendbench.study import absent, cases
 
-    found = module.engine
+    found = absent.engine
 
     def without_mujoco(name):
         if name == "mujoco":
             raise MissingEngineError("engine 'mujoco' cannot be loaded")
         return found(name)
 
-    monkeypatch.setattr(module, "engine", without_mujoco)
+    for module in (absent, cases):
+        monkeypatch.setattr(module, "engine", without_mujoco)
     text = """
 title = "t"
 scenes = ["double"]
@@ -544,7 +545,7 @@ dt = [1e-2]
     study.write_text(text + "optional = true\n")
     plan = load_plan(study)
     assert {case.engine for case in plan.cases} == {"analytic"}
-    assert plan.absent == ("mujoco",)
+    assert list(plan.absent) == ["mujoco"]
     study.write_text(text)
     with pytest.raises(InputError, match="mujoco"):
         load_plan(study)

@@ -14,6 +14,8 @@ from pendbench.base.processes import processors, refuse_without_guard
 from pendbench.base.strict import input_error, show, shown_path
 from pendbench.commands.staging import stage_of_study
 from pendbench.commands.study_table import StudyTable
+from pendbench.engines.elsewhere import use
+from pendbench.engines.registry import engine_names
 from pendbench.execution.cluster import DaskPool
 from pendbench.execution.connect import LOCAL, check_cluster
 from pendbench.execution.pool import LocalPool
@@ -41,8 +43,9 @@ class Request:
     """What was asked for. study: a name or a file. out: a folder, `results/NAME` where None. jobs: worker processes.
 
     scenes: in place of the study's, each a `Scene` or what `load_scene` takes; then `out` is `results/NAME-SCENES`.
-    changes: keys over those of the study's file. cluster: the address of a Dask cluster to run on, or `local`.
     bare: write the tables and where they are from, and no report.
+    changes: keys over those of the study's file. cluster: the address of a Dask cluster to run on, or `local`. pythons:
+    engines of other environments, each as ``ENGINE=PATH``.
     """
 
     study: str | os.PathLike[str]
@@ -55,6 +58,7 @@ class Request:
     fresh: bool = False
     update_baseline: bool = False
     cluster: str | None = None
+    pythons: Sequence[str] = ()
     changes: Mapping[str, Any] = field(default_factory=dict)
     bare: bool = False
 
@@ -95,6 +99,10 @@ def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
     """
     refuse_without_guard()
     workers = _workers(request)
+    if request.pythons:
+        if request.cluster is not None:
+            raise InputError("--python is given with --cluster; allowed: one of them")
+        use(request.pythons, engine_names())
     if request.scenes and (request.check or request.update_baseline):
         option = "--check" if request.check else "--update-baseline"
         raise InputError(f"{option} is about the study's own scenes; allowed: without --scenes")

@@ -33,6 +33,9 @@ def add_options(options: argparse.ArgumentParser) -> None:
     options.add_argument("--jobs", type=int, metavar="N", help="worker processes (default: one per processor)")
     options.add_argument("--cluster", metavar="ADDRESS", help="run on this Dask cluster; `local` starts one here")
     options.add_argument("--bare", action="store_true", help="write tables only: no report, no plots")
+    options.add_argument(
+        "--python", metavar="ENGINE=PATH", action="append", default=[], help="run an engine with this other Python"
+    )
     options.add_argument("--check", action="store_true", help="fail where a result got worse than the study's baseline")
     options.add_argument("--fresh", action="store_true", help="run again what is already in the folder")
     options.add_argument("--update-baseline", action="store_true", help="make these results the study's baseline")
@@ -85,6 +88,7 @@ def _request(chosen: argparse.Namespace) -> Request:
         update_baseline=chosen.update_baseline,
         cluster=chosen.cluster,
         bare=chosen.bare,
+        pythons=tuple(chosen.python),
     )
 
 

@@ -20,11 +20,17 @@ import numpy as np
 from pendbench.base.arrays import FloatArray
 from pendbench.engines.joint_run import JointRun, gravity_at
 from pendbench.engines.joints import bodies, joint_values
-from pendbench.engines.protocol import Mapped, Method, Simulation, needed_step
+from pendbench.engines.protocol import Mapped, Method, Setting, Simulation, needed_step
 from pendbench.engines.silence import silenced
 from pendbench.scene.scene import Scene
 
-_METHODS: Final = {"euler": Method(1, note="Featherstone's algorithm and semi-implicit Euler, deactivation off")}
+_METHODS: Final = {
+    "euler": Method(
+        1,
+        settings={"default_flags": Setting(0, 0, 1, integer=True, note="1: deactivation stays on")},
+        note="Featherstone's algorithm and semi-implicit Euler, deactivation off",
+    )
+}
 _TORQUES: Final = "torques in the joints, computed in Python before each step"
 _EFFECTS: Final = {
     "gravity": Mapped("gravity of the world"),
@@ -45,12 +51,12 @@ _BEYOND_REASON: Final = 1e15  # rad/s
 class _Chain:
     """A world with one skeleton."""
 
-    def __init__(self, scene: Scene, dt: float) -> None:
+    def __init__(self, scene: Scene, dt: float, default: bool) -> None:
         with silenced():  # it warns of points, which have no moment of inertia, and simulates them as it should
             self._skeleton = _skeleton(scene)
         self._world = dartpy.simulation.World()
         options = dartpy.simulation.DeactivationOptions()
-        options.mEnabled = False
+        options.mEnabled = default
         self._world.setDeactivationOptions(options)
         self._world.setTimeStep(dt)
         self.pull(*gravity_at(scene, 0.0))
@@ -59,8 +65,9 @@ class _Chain:
         self._world.addSkeleton(self._skeleton)
 
     def step(self, steps: int) -> None:
-        for _ in range(steps):
-            self._world.step()
+        with silenced():  # it warns of each acceleration that is not finite
+            for _ in range(steps):
+                self._world.step()
 
     def read(self) -> tuple[FloatArray, FloatArray]:
         q, v = np.array(self._skeleton.getPositions()), np.array(self._skeleton.getVelocities())
@@ -104,7 +111,8 @@ class DartEngine:
         """Nothing but effects."""
         return None
 
-    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:  # noqa: ARG002
-        """A run at time 0; the method has no settings."""
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:
+        """A run at time 0."""
         dt = needed_step(method, dt)
-        return JointRun(scene, dt, _Chain(scene, dt))
+        default = bool(self.methods[method].with_defaults(settings)["default_flags"])
+        return JointRun(scene, dt, _Chain(scene, dt, default))

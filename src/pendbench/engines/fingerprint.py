@@ -22,6 +22,8 @@ def fingerprint(name: str) -> str:
     Raises what loading the engine raises.
     """
     its = engine(name)
+    if (own := getattr(its, "fingerprint", None)) is not None:
+        return str(own)  # of an engine of another environment
     adapter = type(its).__module__.partition(".")[0]
     return _of_libraries(frozenset({adapter, *getattr(its, "libraries", (its.name,))} - {"pendbench"}))
 

@@ -19,7 +19,7 @@ import numpy as np
 from pendbench.base.arrays import FloatArray
 from pendbench.engines.joint_run import JointRun, gravity_at
 from pendbench.engines.joints import bodies, joint_values
-from pendbench.engines.protocol import Mapped, Method, Simulation, needed_step
+from pendbench.engines.protocol import Mapped, Method, Setting, Simulation, needed_step
 from pendbench.engines.silence import silenced
 from pendbench.physics import acting
 from pendbench.scene.scene import Scene
@@ -32,7 +32,13 @@ with silenced():  # it says which devices there are
     warp.init()
 
 _METHODS: Final = {
-    "featherstone": Method(1, single=True, plateau=5e-4, note="semi-implicit Euler, its angular damping off"),
+    "featherstone": Method(
+        1,
+        settings={"default_flags": Setting(0, 0, 1, integer=True, note="1: angular damping of 0.05 stays on")},
+        single=True,
+        plateau=5e-4,
+        note="semi-implicit Euler, its angular damping off",
+    ),
 }
 _TORQUES: Final = "torques in the joints, computed in Python before each step"
 _EFFECTS: Final = {
@@ -55,7 +61,7 @@ _FAR: Final = 1e9  # rad: no limit
 class _Chain:
     """A model with one articulation, and two states that take turns."""
 
-    def __init__(self, scene: Scene, dt: float) -> None:
+    def __init__(self, scene: Scene, dt: float, default: bool) -> None:
         self._dt, self._heaviest = dt, float(bodies(scene).masses.max())
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # points have no inertia, of which it warns
@@ -63,7 +69,9 @@ class _Chain:
         self._now, self._next = self._model.state(), self._model.state()
         self._control = self._model.control()
         newton.eval_fk(self._model, self._model.joint_q, self._model.joint_qd, self._now)
-        self._solver = newton.solvers.SolverFeatherstone(self._model, angular_damping=0.0)
+        damping = {} if default else {"angular_damping": 0.0}
+        self._solver = newton.solvers.SolverFeatherstone(self._model, **damping)
+        self._solver.step(self._now, self._next, self._control, None, dt)  # compiles, and is forgotten
 
     def _made(self, scene: Scene) -> Any:
         builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=(*gravity_at(scene, 0.0), 0.0))
@@ -121,7 +129,8 @@ class NewtonEngine:
             return f"{scene.n} links; a step of more than {_MOST_LINKS} takes Newton too long on a processor"
         return None
 
-    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:  # noqa: ARG002
-        """A run at time 0; the method has no settings."""
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:
+        """A run at time 0."""
         dt = needed_step(method, dt)
-        return JointRun(scene, dt, _Chain(scene, dt))
+        default = bool(self.methods[method].with_defaults(settings)["default_flags"])
+        return JointRun(scene, dt, _Chain(scene, dt, default))

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -29,7 +29,10 @@ with silenced():  # it says when it was built
 _METHODS: Final = {
     "multibody": Method(
         1,
-        settings={"substeps": Setting(1, 1, 1000, integer=True, note="of each step; Bullet's own number is 1")},
+        settings={
+            "substeps": Setting(1, 1, 1000, integer=True, note="of each step; Bullet's own number is 1"),
+            "default_flags": Setting(0, 0, 1, integer=True, note="1: damping and limits stay on; motors do not"),
+        },
         note="Featherstone's algorithm and semi-implicit Euler, motors and damping off",
     )
 }
@@ -48,15 +51,23 @@ _EFFECTS: Final = {
     "links": Mapped("mass, centre and inertia of the links"),
 }
 _MOST_LINKS: Final = 127  # MAX_DEGREE_OF_FREEDOM of its interface is 128
-_FASTEST: Final = 1e12  # rad/s
+#: What is switched off, unless it is to stay as it comes.
+_OFF: Final[Mapping[str, Any]] = {
+    "linearDamping": 0.0,
+    "angularDamping": 0.0,
+    "jointDamping": 0.0,
+    "maxJointVelocity": 1e12,  # rad/s
+    "activationState": bullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+}
+_BASES: Final = ("linearDamping", "angularDamping")
 
 
 class _Chain:
     """A world with one chain in it, each in a physics server of its own."""
 
-    def __init__(self, scene: Scene, dt: float, substeps: int) -> None:
+    def __init__(self, scene: Scene, dt: float, substeps: int, default: bool) -> None:
         self._client, self._joints = bullet.connect(bullet.DIRECT), range(scene.n)
-        self._body = self._made(scene)
+        self._body = self._made(scene, {} if default else _OFF)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=dt, numSubSteps=0 if substeps == 1 else substeps, physicsClientId=self._client
         )
@@ -70,7 +81,7 @@ class _Chain:
         if hasattr(self, "_client") and bullet.isConnected(self._client):
             bullet.disconnect(self._client)
 
-    def _made(self, scene: Scene) -> int:
+    def _made(self, scene: Scene, off: Mapping[str, Any]) -> int:
         masses, centres, inertias = bodies(scene)
         n, unturned = scene.n, [0.0, 0.0, 0.0, 1.0]
         ends = [[0.0, 0.0, 0.0], *([0.0, -length, 0.0] for length in scene.lengths[:-1].tolist())]
@@ -90,19 +101,10 @@ class _Chain:
         )
         self._scale = float(masses.max())
         for link, inertia in zip(self._joints, (inertias / self._scale).tolist(), strict=True):
-            bullet.changeDynamics(
-                body,
-                link,
-                linearDamping=0.0,
-                angularDamping=0.0,
-                jointDamping=0.0,
-                maxJointVelocity=_FASTEST,
-                activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING,
-                physicsClientId=self._client,
-            )
+            bullet.changeDynamics(body, link, physicsClientId=self._client, **off)
             # A call of its own: beside the others it is lost.
             bullet.changeDynamics(body, link, localInertiaDiagonal=[inertia] * 3, physicsClientId=self._client)
-        bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=self._client)
+        bullet.changeDynamics(body, -1, physicsClientId=self._client, **{key: 0.0 for key in off if key in _BASES})
         bullet.setJointMotorControlArray(
             body, self._joints, bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=self._client
         )
@@ -146,5 +148,5 @@ class PybulletEngine:
     def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:
         """A run at time 0."""
         dt = needed_step(method, dt)
-        substeps = int(self.methods[method].with_defaults(settings)["substeps"])
-        return JointRun(scene, dt, _Chain(scene, dt, substeps))
+        chosen = self.methods[method].with_defaults(settings)
+        return JointRun(scene, dt, _Chain(scene, dt, int(chosen["substeps"]), bool(chosen["default_flags"])))

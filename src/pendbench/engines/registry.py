@@ -6,17 +6,21 @@ without arguments, or a function, that gives an `Engine`.
 
 from __future__ import annotations
 
+import json
+import os
 import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib.metadata import EntryPoint, entry_points, requires
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 from pendbench.base.errors import InputError, MissingEngineError, choose, describe, printable
 from pendbench.base.strict import show
 from pendbench.engines.protocol import Engine, Method
 
 GROUP: Final = "pendbench.engines"
+#: The variable that names engines of other environments, so that worker processes inherit it: a JSON object.
+PYTHONS: Final = "PENDBENCH_PYTHONS"
 
 Factory = Callable[[], Engine]
 
@@ -39,10 +43,10 @@ _BUNDLED: Final = {
     "scipy": ("pendbench.engines.scipy:ScipyEngine", "scipy"),
     "xpbd": ("pendbench.engines.xpbd.adapter:XpbdEngine", "pendbench"),
 }
-# Those whose program comes with an extra of that package, of the same name.
-_EXTRAS: Final = frozenset(_BUNDLED) - {"analytic", "mujoco", "pymunk", "scipy", "xpbd"}
 # What their programs were called in earlier releases.
 _FORMERLY: Final = {"mujoco": ("mujoco",)}
+# Those that pendbench brings along; the program of each of the others comes with an extra of the same name.
+_ALONG: Final = frozenset({"analytic", "mujoco", "pymunk", "scipy", "xpbd"})
 # Those that run where no engines are named; the others are many, and most step in Python or compile for long.
 _UNASKED: Final = frozenset({"analytic", "heyoka", "mujoco", "pinocchio", "pymunk"})
 _registered: dict[str, Factory] = {}
@@ -69,6 +73,16 @@ def only_by_name(name: str) -> bool:
     return name in _BUNDLED and name not in _UNASKED
 
 
+def comes_along(name: str) -> bool:
+    """Whether an engine is installed with pendbench itself, or was registered in this process."""
+    return name in _registered or name in _ALONG
+
+
+def python_of(name: str) -> str | None:
+    """The Python of another environment that has an engine, where one was named; None for an engine of this one."""
+    return cast("str | None", json.loads(os.environ.get(PYTHONS, "{}")).get(name))
+
+
 def is_foreign(name: str) -> bool:
     """Whether the engine is somebody else's, found through an entry point: nobody here has ever loaded it."""
     return name not in _registered and name not in _BUNDLED and name in entry_points(group=GROUP).names
@@ -81,7 +95,7 @@ def packages(name: str) -> tuple[str, ...]:
     """
     source = _source(name)
     package = source.package
-    if name in _EXTRAS:
+    if name in _BUNDLED and name not in _ALONG:
         found = (re.match(r"([\w.-]+).*;.*extra == .(\w+).$", each) for each in requires("pendbench") or ())
         package = next((its[1] for its in found if its and its[2] == name), None)
     if package is None or package == "pendbench":
@@ -101,6 +115,10 @@ def engine(name: str) -> Engine:
     Raises `InputError` for an unknown name, and `MissingEngineError` for an engine that cannot be loaded, with the
     command that installs it; one line each. A broken engine does not affect the others.
     """
+    if (path := python_of(name)) is not None:
+        from pendbench.engines.elsewhere import stand_in
+
+        return stand_in(name, path)
     source = _source(name)
     try:
         made = source.load()()
@@ -132,7 +150,7 @@ def _source(name: str) -> _Source:
         return _Source(name, lambda: _registered[name], None)
     if name in _BUNDLED:
         target, package = _BUNDLED[name]
-        wanted = f'"{package}[{name}]"' if name in _EXTRAS else package
+        wanted = f'"{package}[{name}]"' if name not in _ALONG else package
         return _Source(name, EntryPoint(name, target, GROUP).load, wanted)
     offers = {_package(entry): entry for entry in entry_points(group=GROUP, name=name)}
     if not offers:

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 
 class Columns(Protocol):
-    """What the module `columns` of a kind offers. SUMMARY: the columns of the terminal's table."""
+    """What the module `columns` of a kind offers. SUMMARY: the columns of `cases` that are worth a glance.
+
+    It may have `GLANCE`, another table and its columns, for the terminal to show in place of these.
+    """
 
     SUMMARY: Sequence[str]
 
@@ -66,6 +69,12 @@ class Report:
     def summary(self) -> Sequence[str]:
         """The columns of `cases` that are worth a glance."""
         return self._columns.SUMMARY
+
+    @property
+    def glance(self) -> tuple[Table, Sequence[str]]:
+        """The table that a terminal shows, and its columns."""
+        name, columns = getattr(self._columns, "GLANCE", ("cases", self.summary))
+        return self.tables[name], columns
 
     @cached_property
     def pictures(self) -> list[Picture]:

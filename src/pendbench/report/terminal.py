@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-_LONGEST: Final = 28
+_LONGEST: Final = 40
 
 
 def summary_table(report: Report) -> Table:
-    """A row for each case, in the columns that the kind of study finds worth a glance."""
-    return shown_table(report.cases, report.summary, report.results.title)
+    """What the kind of study finds worth a glance: of most kinds a row for each case."""
+    return shown_table(*report.glance, report.results.title)
 
 
 def shown_table(table: report_columns.Table, names: Sequence[str], title: str = "") -> Table:

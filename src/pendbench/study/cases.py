@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Collection, Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
-from pendbench.base.errors import InputError, MissingEngineError, choose, printable
+from pendbench.base.errors import InputError, choose, printable
 from pendbench.base.faults import Fault
 from pendbench.base.strict import input_error, show
 from pendbench.engines.protocol import Method
@@ -33,15 +33,18 @@ class Asked(NamedTuple):
     settings: list[Settings]
 
 
-def selected(where: str, tables: Sequence[EngineTable], only: Sequence[str]) -> list[Placed]:
-    """The tables of the engines asked for, each with where it is. Raises InputError for an engine that cannot be."""
+def selected(where: str, tables: Sequence[EngineTable], only: Sequence[str], *, apart: bool = False) -> list[Placed]:
+    """The tables of the engines asked for, each with where it is. Raises InputError for an engine that cannot be.
+
+    apart: optional engines are loaded apart, later: none of them is an error.
+    """
     known = {table.name for table in tables}
     for name in only:
         if name not in known:
             raise InputError(f"--engines: {choose('engine', printable(str(name)), known)} (the engines of {where})")
-    places = ((f"{where} [engines number {number}]", table) for number, table in enumerate(tables, 1))
+    places = ((table.place(where, number), table) for number, table in enumerate(tables, 1))
     chosen = [(at, table) for at, table in places if not only or table.name in only]
-    _check_loading(chosen)
+    _check_loading([(at, table) for at, table in chosen if not (apart and table.optional)])
     return chosen
 
 
@@ -51,17 +54,6 @@ def _check_loading(tables: Sequence[Placed]) -> None:
     for (name, at), found in zip(foreign.items(), ask_each(try_to_load, [(name,) for name in foreign]), strict=True):
         if isinstance(found, Fault):
             raise input_error(at, f"engine {name!r} cannot be loaded: {found.status}, {found.reason}")
-
-
-def is_installed(name: str) -> bool:
-    """Whether an engine can be loaded. An unknown name is no engine to leave out: that is said where it is read."""
-    try:
-        engine(name)
-    except MissingEngineError:
-        return False
-    except InputError:
-        return True
-    return True
 
 
 def cases_of(

@@ -7,7 +7,7 @@ import json
 import os
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,17 +16,18 @@ from pendbench.base.bundled import bundled, bundled_names
 from pendbench.base.errors import InputError, choose, printable
 from pendbench.base.strict import input_error, read_toml, show, shown_path, validate
 from pendbench.scene.scene import Scene, load_scene
+from pendbench.study.absent import why_absent
 from pendbench.study.case import Case
-from pendbench.study.cases import cases_of, is_installed, selected
+from pendbench.study.cases import cases_of, selected
 from pendbench.study.kinds import kind, kinds
-from pendbench.study.study_file import StudyFile, about_scenes, default_tables
+from pendbench.study.study_file import StudyFile, about_scenes
 
 
 @dataclass(frozen=True)
 class Plan:
     """A study, ready to run.
 
-    options: the file's keys, checked, those of its kind among them. absent: optional engines that are not installed.
+    options: the file's keys, checked, those of its kind among them. absent: optional engines left out, and why.
     """
 
     name: str
@@ -35,7 +36,7 @@ class Plan:
     scenes: tuple[Scene, ...]
     cases: tuple[Case, ...]
     quick: bool
-    absent: tuple[str, ...] = ()
+    absent: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
@@ -91,8 +92,8 @@ def load_plan(
         data = about_scenes(data, [scene.name for scene in scenes], its.Options.ABOUT_SCENES)
     where, options = _options(data, its.Options, where, quick=quick, named=engines)
     chosen = tuple(scenes or _scenes(where, options.scenes, path.parent))
-    tables = selected(where, options.engines, engines)
-    absent = sorted({table.name for _, table in tables if table.optional and not is_installed(table.name)})
+    tables = selected(where, options.engines, engines, apart=its.Options.LOADED_APART)
+    absent = why_absent({table.name for _, table in tables if table.optional}, apart=its.Options.LOADED_APART)
     if absent and all(table.name in absent for _, table in tables):
         raise InputError(f"--engines: {', '.join(absent)}: not installed, and no other engine was asked for")
     present = [(at, table) for at, table in tables if table.name not in absent]
@@ -100,7 +101,7 @@ def load_plan(
     idle = {scene.name for scene in chosen} - {case.scene.name for case in cases}
     if idle and not engines:
         raise input_error(where, f"scenes has {min(idle)!r}, and no table of [[engines]] is for it")
-    plan = Plan(printable(path.stem), where, options, chosen, cases, quick, tuple(absent))
+    plan = Plan(printable(path.stem), where, options, chosen, cases, quick, absent)
     its.check(plan)
     return plan
 
@@ -133,7 +134,7 @@ def _options(
     if quick:
         where, options = f"{where} [quick]" if overlay else where, changed
     if options.engines is None:
-        options = options.model_copy(update={"engines": default_tables(its, named)})
+        options = options.model_copy(update={"engines": its.default_engines(named)})
     return where, options
 
 

@@ -24,7 +24,7 @@ def provenance(plan: Plan, workers: int) -> dict[str, Any]:
         "pendbench": __version__,
         "pendbench source": source_digest(),
         **{f"engine {name}": version(name) for name in names},
-        **{f"engine {name}": "not installed, left out" for name in plan.absent},
+        **{f"engine {name}": f"left out: {why}" for name, why in plan.absent.items()},
         **{name: metadata.version(name) for name in _LIBRARIES},
         "python": platform.python_version(),
         "operating system": platform.platform(),

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr
 
 from pendbench.base.errors import MissingEngineError
 from pendbench.base.ranges import Step
@@ -33,6 +33,16 @@ class EngineTable(Table):
     """the names of those of the study's scenes that these are for; all of them by default"""
     optional: bool = False
     """leave the engine out where it is not installed, and say so"""
+    _origin: str = PrivateAttr("")
+
+    def of(self, origin: str) -> Self:
+        """The same table, which stands in another file than the study's: `origin` says where."""
+        self._origin = origin
+        return self
+
+    def place(self, study: str, number: int) -> str:
+        """Where it stands, for messages; number: of the study's tables."""
+        return self._origin or f"{study} [engines number {number}]"
 
 
 class StudyFile(Table):
@@ -44,6 +54,8 @@ class StudyFile(Table):
     TOLERANCES: ClassVar[tuple[float, ...]] = ()
     #: The kind's keys that name scenes: with --scenes they keep what is about one of those.
     ABOUT_SCENES: ClassVar[tuple[str, ...]] = ()
+    #: Whether engines that may be left out are first loaded in processes of their own, which may crash or hang.
+    LOADED_APART: ClassVar[bool] = False
 
     title: Annotated[str, AfterValidator(one_line_title)] | None = None
     """one line, the report's heading; the study's name by default"""
@@ -59,6 +71,11 @@ class StudyFile(Table):
     """GB (1e9 bytes) that each job may take; less than half a GB would fail good engines, which compile their code"""
     quick: dict[str, Any] = {}
     """keys that take the place of the others' values with --quick"""
+
+    @classmethod
+    def default_engines(cls, named: Sequence[str]) -> Sequence[EngineTable]:
+        """What is run where the file names no engines; `named`: on the command line."""
+        return default_tables(cls, named)
 
 
 def default_tables(options: type[StudyFile], named: Sequence[str] = ()) -> list[EngineTable]:
