@@ -192,8 +192,8 @@ def files(folder: Path) -> set[Path]:
     ("arguments", "said"),
     [
         ([], "which study? a bundled name (--list shows them) or a path to a .toml file"),
-        (["--quik"], "unknown option '--quik'; did you mean '--quick'? allowed: --check, --cluster, --engines, "),
-        (["chaos", "--x=5"], "unknown option '--x=5'; allowed: --check, "),
+        (["--quik"], "unknown option '--quik'; did you mean '--quick'? allowed: --bare, --check, --cluster, "),
+        (["chaos", "--x=5"], "unknown option '--x=5'; allowed: --bare, --check, "),
         (["chaos", "double"], "'double' after 'chaos'; allowed: one study"),
         (["chaos", "--out"], "argument --out: expected one argument"),
         (["chaos", "--jobs", "x"], "--jobs is 'x'; allowed: a whole number"),
