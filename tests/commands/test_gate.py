@@ -68,7 +68,7 @@ def test_a_right_engine_passes(right):
     ],
 )
 def test_what_an_engine_does_to_one_check_is_said_there_and_the_others_are_asked(name, status, cause):
-    gate = asked(f"support.gate_engines:{name}")
+    gate = asked(f"support.gate_engines:{name}", time_limit=2.0 if name == "sleeping" else 5.0)
     found = by_check(gate)
     assert found["owns up"].status == status
     assert found["owns up"].cause.startswith(cause)
