@@ -305,3 +305,18 @@ def test_lines_of_code_are_counted_without_comments_and_empty_lines(monkeypatch)
     text = "# a comment\nimport this\n\n    \nx = 1  # and\n  # indented\ny = 2\n"
     monkeypatch.setattr("pendbench.kinds.league.rows.engine_file", lambda _: ("", SimpleNamespace(snippet=text)))
     assert lines_of("mine") == 3
+
+
+@pytest.mark.parametrize("name", [path.stem for path in (bundled("studies") / "league").glob("*.toml")])
+def test_the_code_that_is_counted_simulates_the_challenge(name):
+    _, file = engine_file(name)
+    if file.snippet is None:
+        pytest.skip(f"there is no snippet for {name}")
+    if why_absent([name], apart=False):
+        pytest.skip(f"{name} is not installed")
+    made: dict[str, object] = {}
+    exec(file.snippet, made)
+    truth = pb.reference("challenge", [0.0, 0.1]).theta[-1]
+    apart = np.asarray(made["theta"], np.float64) - truth
+    # The worst of those that come with pendbench, MuJoCo's Euler at 2 ms, is off by 0.007 rad.
+    assert np.abs((apart + np.pi) % (2 * np.pi) - np.pi).max() < 0.01

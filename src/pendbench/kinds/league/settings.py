@@ -58,7 +58,7 @@ class EngineFile(Table):
     tried: Annotated[list[Tried], Field(min_length=1)]
     """what is tried at its best"""
     snippet: Annotated[str, Field(min_length=1, max_length=20_000)] | None = None
-    """what a user writes, without pendbench, to have the angles `theta` (rad) of the challenge after a second"""
+    """what a user writes to have the angles `theta` (rad) of the challenge at 0.1 s"""
 
 
 def engine_file(name: str) -> tuple[str, EngineFile] | None:
