@@ -27,10 +27,10 @@ def folder(tmp_path):
 
 
 def test_both_tables_the_versions_and_the_machine_are_written(folder):
-    found = tables_of(folder)
+    found = tables_of(folder, "1 May")
     assert HERE in found
     assert found.index(OTHERS, found.index("Without our own:")) > 0
-    assert "in full" in found
+    assert found.startswith("1 May, in full.")
     assert "Versions: analytic 0.1.0, mujoco 4.0.1." in found
     assert "Not there: newton." in found
     assert "processor a processor" in found
@@ -38,11 +38,11 @@ def test_both_tables_the_versions_and_the_machine_are_written(folder):
 
 def test_they_take_the_place_of_the_last_ones(folder):
     page = "before\n<!-- tables -->\nold\n<!-- end of tables -->\nafter\n"
-    found = with_tables(page, folder)
+    found = with_tables(page, folder, "1 May")
     assert found.startswith("before\n<!-- tables -->\n")
     assert found.endswith("<!-- end of tables -->\nafter\n")
     assert "old" not in found
-    assert with_tables(found, folder) == found
+    assert with_tables(found, folder, "1 May") == found
 
 
 @pytest.mark.parametrize("kind", [None, "chaos"])
@@ -52,4 +52,4 @@ def test_a_folder_of_something_else_is_one_line(folder, kind):
     else:
         (folder / "provenance.json").write_text(json.dumps(FACTS | {"kind": kind}))
     with pytest.raises(InputError, match="allowed: the folder of a league's results"):
-        tables_of(folder)
+        tables_of(folder, "1 May")

@@ -1,7 +1,7 @@
 """The league's tables in docs/league.md, from a folder of results.
 
-``python -m pendbench.commands.league_page results/league`` writes them again, below the working folder, with the date,
-the versions and the machine.
+``python -m pendbench.commands.league_page results/league DATE`` writes them again, below the working folder, with the
+date as it is given, the versions and the machine.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
@@ -28,7 +27,7 @@ _MACHINE: Final = (
 )
 
 
-def tables_of(folder: Path) -> str:
+def tables_of(folder: Path, date: str) -> str:
     """What a league found, as Markdown. Raises InputError for a folder without its report."""
     try:
         report = (folder / "report.md").read_text("utf-8")
@@ -38,8 +37,7 @@ def tables_of(folder: Path) -> str:
     if facts.get("kind") != "league":
         raise InputError(f"{folder}: a study of kind {facts.get('kind')!r}; allowed: the folder of a league's results")
     here, *others = _grids(report)
-    run = datetime.fromtimestamp((folder / "report.md").stat().st_mtime, UTC)
-    parts = [f"{run:%d %B %Y}, {'the quick variant' if facts['quick'] else 'in full'}. All engines:", here]
+    parts = [f"{date}, {'the quick variant' if facts['quick'] else 'in full'}. All engines:", here]
     if "## Without our own engine" in report:
         parts += ["Without our own:", others[0]]
     return "\n\n".join([*parts, *_sources(facts)]) + "\n"
@@ -60,18 +58,20 @@ def _sources(facts: dict[str, Any]) -> Iterator[str]:
     yield f"Machine: {', '.join(f'{name} {facts[name]}' for name in _MACHINE if name in facts)}."
 
 
-def with_tables(page: str, folder: Path) -> str:
+def with_tables(page: str, folder: Path, date: str) -> str:
     """The page with the tables in their place."""
     before, _, rest = page.partition(_BEGINS)
     _, _, after = rest.partition(_ENDS)
-    return f"{before}{_BEGINS}{tables_of(folder)}{_ENDS}{after}"
+    return f"{before}{_BEGINS}{tables_of(folder, date)}{_ENDS}{after}"
 
 
 def main() -> None:
     """Write them into docs/league.md, below the working folder."""
     page = Path("docs/league.md")
     try:
-        text = with_tables(page.read_text("utf-8"), Path(sys.argv[1] if len(sys.argv) > 1 else "results/league"))
+        if len(sys.argv) != 3:
+            raise InputError("league_page needs the folder of a league's results and the date")
+        text = with_tables(page.read_text("utf-8"), Path(sys.argv[1]), sys.argv[2])
     except InputError as error:
         sys.exit(f"error: {error}")
     page.write_text(text, encoding="utf-8", newline="\n")
