@@ -13,6 +13,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+sys.path.pop(0)  # this folder's: its profile.py is not the one that an engine imports
+
 import pendbench as pb
 from pendbench.engines.elsewhere import use
 from pendbench.engines.registry import engine_names
