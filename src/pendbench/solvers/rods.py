@@ -1,0 +1,266 @@
+"""The steps of implicit methods for long chains: formulas over whole rods, from the last steps to the next.
+
+`implicit` says which methods these are and puts the steps in a row; `closing` has Newton's method. equations.md, (E58)
+to (E64).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import compiled, inlined
+from pendbench.solvers.closing import (
+    ALONG_Y,
+    ANGLE,
+    FORCE_X,
+    FORCE_Y,
+    GUESS,
+    PULL,
+    ROD_X,
+    ROD_Y,
+    SPARE,
+    WANTED_X,
+    WANTED_Y,
+    Chain,
+    Room,
+    write_rods,
+)
+
+#: A step is cut into so many parts at most.
+FINEST = 1024
+
+#: The members: implicit Euler, BDF2, and the one that conserves energy and momentum.
+EULER, BDF2, CONSERVING = 1, 2, 3
+
+#: Of a first step, the length squared times the largest angular acceleration, rad.
+_FIRST_TURN = 0.2
+
+# The rows of the memory.
+_ROD, _SPEED, _ROD_BEFORE, _SPEED_BEFORE, _TURNED, _TURNED_BEFORE, _TENSION, _TENSION_RATE = 0, 2, 4, 6, 8, 9, 10, 11
+
+
+class State(NamedTuple):
+    """What is kept from step to step.
+
+    q, v (n,): angles and rates after the last step. memory (12, n): the rods (x, y), m, their speeds (x, y), m/s, and
+    both before the last step; the mean rates of the last two steps, rad/s; tensions, N, and how they changed, N/s.
+    steps (3,): the length of the last two, s, and the part of a step, of `FINEST`, to try next; 0 before the first.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    memory: FloatArray
+    steps: FloatArray
+
+
+class _Formula(NamedTuple):
+    """A step: q = rod r + speed v + rod_before r_b + speed_before v_b, and v' = new r' + old r + older r_b.
+
+    scale: how a tension moves a mass, s^2. share: where between old and new a rod pulls.
+    """
+
+    scale: float
+    share: float
+    rod: float
+    speed: float
+    rod_before: float
+    speed_before: float
+    new: float
+    old: float
+    older: float
+
+
+def begin(q: FloatArray, v: FloatArray) -> State:
+    """The state at the start, copied."""
+    return State(q.copy(), v.copy(), np.zeros((12, len(q))), np.zeros(3))
+
+
+@inlined
+def _formula(member: int, h: float, ratio: float) -> _Formula:
+    """The step of h (s) after one that was shorter by the factor `ratio`. equations.md, (E61) to (E63)."""
+    if member == EULER:
+        return _Formula(h * h, 1.0, 1.0, h, 0.0, 0.0, 1.0 / h, -1.0 / h, 0.0)
+    if member == CONSERVING:
+        return _Formula(0.5 * h * h, 0.5, 1.0, h, 0.0, 0.0, 0.0, 0.0, 0.0)
+    new, old, older = (1.0 + 2.0 * ratio) / (1.0 + ratio), -(1.0 + ratio), ratio * ratio / (1.0 + ratio)
+    once, twice = 1.0 / new, h / (new * new)
+    return _Formula(
+        h * twice, 1.0, -old * once, -old * twice, -older * once, -older * twice, new / h, old / h, older / h
+    )
+
+
+@inlined
+def _solve_rods(chain: Chain, rows: FloatArray, n: int) -> None:
+    """Forces along the rods (ROD of `rows`) that change their speeds along them by SPARE, in place.
+
+    The change of rod i is a_i f_i - c_(i+1) f_(i+1) - c_i f_(i-1), with f along the rods.
+    """
+    couplings = chain.couplings
+    rows[PULL, 0] = 1.0 / couplings[1]
+    for i in range(1, n):
+        beside = -couplings[i] * (rows[ROD_X, i] * rows[ROD_X, i - 1] + rows[ROD_Y, i] * rows[ROD_Y, i - 1])
+        ratio = beside * rows[PULL, i - 1]
+        rows[PULL, i] = 1.0 / (couplings[i] + couplings[i + 1] - ratio * beside)
+        rows[SPARE, i] -= ratio * rows[SPARE, i - 1]
+    rows[SPARE, n - 1] *= rows[PULL, n - 1]
+    for i in range(n - 2, -1, -1):
+        beside = -couplings[i + 1] * (rows[ROD_X, i] * rows[ROD_X, i + 1] + rows[ROD_Y, i] * rows[ROD_Y, i + 1])
+        rows[SPARE, i] = (rows[SPARE, i] - beside * rows[SPARE, i + 1]) * rows[PULL, i]
+    for i in range(n):
+        rows[FORCE_X, i + 1] = rows[SPARE, i] * rows[ROD_X, i]
+        rows[FORCE_Y, i + 1] = rows[SPARE, i] * rows[ROD_Y, i]
+    rows[FORCE_X, n + 1], rows[FORCE_Y, n + 1] = 0.0, 0.0
+
+
+@inlined
+def _across(chain: Chain, rows: FloatArray, i: int, x: float, y: float) -> float:
+    """How fast rod i turns with (x, y) less what FORCE does to it, over a length."""
+    c_in, c_out = chain.couplings[i], chain.couplings[i + 1]
+    x -= (c_in + c_out) * rows[FORCE_X, i + 1] - c_in * rows[FORCE_X, i] - c_out * rows[FORCE_X, i + 2]
+    y -= (c_in + c_out) * rows[FORCE_Y, i + 1] - c_in * rows[FORCE_Y, i] - c_out * rows[FORCE_Y, i + 2]
+    across: float = rows[ROD_X, i] * y - rows[ROD_Y, i] * x
+    return across / float(chain.lengths[i])
+
+
+@compiled
+def write_rates(chain: Chain, state: State, room: Room) -> None:
+    """The rates of the motion nearest to the speeds that keeps the rods' lengths. equations.md, (E64)."""
+    rows, memory, n = room.rows, state.memory, len(state.q)
+    write_rods(state.q, rows, ROD_Y)
+    for i in range(n):
+        rows[SPARE, i] = rows[ROD_X, i] * memory[_SPEED, i] + rows[ROD_Y, i] * memory[_SPEED + 1, i]
+    _solve_rods(chain, rows, n)
+    for i in range(n):
+        state.v[i] = _across(chain, rows, i, memory[_SPEED, i], memory[_SPEED + 1, i])
+
+
+@inlined
+def _write_motion(
+    chain: Chain, memory: FloatArray, rows: FloatArray, angles: FloatArray, v: FloatArray, at: int
+) -> None:
+    """Write the rods at angles (n,) and, with rates v (n,), their speeds into four rows of the memory."""
+    write_rods(angles, rows, ROD_Y)
+    for i in range(len(v)):
+        x, y = chain.lengths[i] * rows[ROD_X, i], chain.lengths[i] * rows[ROD_Y, i]
+        memory[at, i], memory[at + 1, i], memory[at + 2, i], memory[at + 3, i] = x, y, -v[i] * y, v[i] * x
+
+
+@compiled
+def restart(chain: Chain, state: State, room: Room) -> None:
+    """Go on from speeds that keep the rods' lengths, those of the rates."""
+    _write_motion(chain, state.memory, room.rows, state.q, state.v, _ROD)
+
+
+@compiled
+def start(chain: Chain, state: State, room: Room, dt: float) -> None:
+    """What a first step looks back on: the motion before the start, from the accelerations there.
+
+    It is so short a part of dt (s) that no rod turns far in it.
+    """
+    rows, memory, n = room.rows, state.memory, len(state.q)
+    _write_motion(chain, memory, rows, state.q, state.v, _ROD)
+    for i in range(n):
+        pull = -chain.gravity * rows[ROD_Y, i] if i == 0 else 0.0
+        memory[_TENSION, i] = pull + chain.lengths[i] * state.v[i] * state.v[i]
+        rows[SPARE, i] = memory[_TENSION, i]
+    _solve_rods(chain, rows, n)
+    size, most = FINEST, 0.0
+    for i in range(n):
+        memory[_TENSION, i] = rows[SPARE, i]
+        fall = -chain.gravity if i == 0 else 0.0
+        rows[WANTED_X, i] = _across(chain, rows, i, 0.0, fall)
+        most = max(most, abs(rows[WANTED_X, i]))
+    while size > 1 and (dt * size / FINEST) ** 2 * most > _FIRST_TURN:
+        size //= 2
+    h = dt * size / FINEST
+    for i in range(n):
+        turning = rows[WANTED_X, i]
+        memory[_TURNED, i] = state.v[i] - 0.5 * h * turning
+        memory[_TURNED_BEFORE, i] = state.v[i] - 1.5 * h * turning
+        rows[ANGLE, i] = state.q[i] - h * state.v[i] + 0.5 * h * h * turning
+        rows[GUESS, i] = state.v[i] - h * turning
+    _write_motion(chain, memory, rows, rows[ANGLE, :n], rows[GUESS, :n], _ROD_BEFORE)
+    state.steps[0], state.steps[1], state.steps[2] = h, h, size
+
+
+@compiled
+def propose(chain: Chain, state: State, room: Room, member: int, h: float, plainly: bool) -> None:
+    """Write what a step of h (s) of a member wants, and a guess. plainly: that the last goes on, not how it changed."""
+    rows, memory, n, last, before = room.rows, state.memory, len(state.q), state.steps[0], state.steps[1]
+    f = _formula(member, h, h / last)
+    ahead = 0.0 if plainly else (h + last) / (last + before)
+    later = 0.0 if plainly else h
+    for axis in range(2):
+        for i in range(n):
+            rows[WANTED_X + axis, i] = f.rod * memory[_ROD + axis, i] + f.speed * memory[_SPEED + axis, i]
+        if member == BDF2:
+            for i in range(n):
+                rods, speeds = memory[_ROD_BEFORE + axis, i], memory[_SPEED_BEFORE + axis, i]
+                rows[WANTED_X + axis, i] += f.rod_before * rods + f.speed_before * speeds
+    rows[WANTED_Y, 0] -= f.scale * chain.gravity
+    for i in range(n):
+        rate = memory[_TURNED, i]
+        rows[ANGLE, i] = state.q[i] + h * (rate + ahead * (rate - memory[_TURNED_BEFORE, i]))
+        rows[PULL, i] = f.scale * (memory[_TENSION, i] + later * memory[_TENSION_RATE, i])
+
+
+@compiled
+def miss(chain: Chain, state: State, room: Room, h: float) -> float:
+    """How far (m) the points are from where speeds and their last change would take them."""
+    rows, memory, lengths = room.rows, state.memory, chain.lengths
+    x, y, worst, half = 0.0, 0.0, 0.0, 0.5 * h * h / state.steps[0]
+    for i in range(len(lengths)):
+        v_x, v_y = memory[_SPEED, i], memory[_SPEED + 1, i]
+        x += lengths[i] * rows[ROD_X, i] - memory[_ROD, i] - h * v_x - half * (v_x - memory[_SPEED_BEFORE, i])
+        y += lengths[i] * rows[ROD_Y, i] - memory[_ROD + 1, i] - h * v_y - half * (v_y - memory[_SPEED_BEFORE + 1, i])
+        worst = max(worst, x * x + y * y)
+    return float(np.sqrt(worst))
+
+
+@compiled
+def accelerate(chain: Chain, state: State, room: Room, h: float) -> None:
+    """Change the speeds by what pulls along the mean of old and new rods, and gravity, do in a step of h (s).
+
+    (E63) says the same by positions, whose rounding errors over h would add up where nothing damps.
+    """
+    rows, couplings, n = room.rows, chain.couplings, len(state.q)
+    for i in range(n):
+        rows[SPARE, i] = 0.5 * (state.q[i] + rows[ANGLE, i])
+    write_rods(rows[SPARE, :n], rows, ALONG_Y)
+    for i in range(n):
+        force = 2.0 * rows[PULL, i] / h
+        rows[FORCE_X, i + 1], rows[FORCE_Y, i + 1] = force * rows[ALONG_Y + 1, i], force * rows[ALONG_Y, i]
+    for row, force_row in ((_SPEED, FORCE_X), (_SPEED + 1, FORCE_Y)):
+        for i in range(n):
+            pulled = (couplings[i] + couplings[i + 1]) * rows[force_row, i + 1]
+            pulled -= couplings[i] * rows[force_row, i] + couplings[i + 1] * rows[force_row, i + 2]
+            state.memory[row, i] -= pulled
+    state.memory[_SPEED + 1, 0] -= h * chain.gravity
+
+
+@compiled
+def accept(chain: Chain, state: State, room: Room, member: int, h: float) -> None:
+    """Go on to what closed."""
+    rows, memory, n = room.rows, state.memory, len(state.q)
+    f = _formula(member, h, h / state.steps[0])
+    for axis in range(2):
+        rod_row = ROD_X if axis == 0 else ROD_Y
+        for i in range(n):
+            rod, speed = memory[_ROD + axis, i], memory[_SPEED + axis, i]
+            new = chain.lengths[i] * rows[rod_row, i]
+            older = f.older * memory[_ROD_BEFORE + axis, i]
+            if member != CONSERVING:
+                memory[_SPEED + axis, i] = f.new * new + f.old * rod + older
+            memory[_ROD + axis, i] = new
+            memory[_ROD_BEFORE + axis, i], memory[_SPEED_BEFORE + axis, i] = rod, speed
+    for i in range(n):
+        memory[_TURNED_BEFORE, i] = memory[_TURNED, i]
+        memory[_TURNED, i] = (rows[ANGLE, i] - state.q[i]) / h
+        tension = rows[PULL, i] / f.scale
+        memory[_TENSION_RATE, i] = (tension - memory[_TENSION, i]) / h
+        memory[_TENSION, i] = tension
+        state.q[i] = rows[ANGLE, i]
+    state.steps[1], state.steps[0] = state.steps[0], h
