@@ -44,6 +44,8 @@ def main() -> None:
     for method, declared in engine("analytic").methods.items():
         step = "its own" if declared.adaptive else "fixed"
         for scene, effects in SCENES.items():
+            if declared.effects is not None and not declared.effects >= set(effects):
+                continue
             with tempfile.TemporaryDirectory() as cache:
                 first, again = (call(cache, method, effects, step) for _ in range(2))
             numbers = f"{first[0]:.1f} | {first[1]:.0f} | {again[0]:.1f} | {again[1]:.0f}"
