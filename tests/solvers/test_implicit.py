@@ -184,7 +184,7 @@ def test_second_order_keeps_what_first_order_damps() -> None:
 
 
 def test_the_first_swing_of_a_rope_is_that_of_accurate_steps() -> None:
-    """Centre of mass, tip and lowest point within 2 % of the length until the rope turns, at 0.82 s: measured 1.8 %."""
+    """Centre of mass, tip and lowest point within 2 % of the length until 0.82 s: measured 1.8 %."""
     scene, times = rope(100), FRAME * np.arange(0, 200, 4)
     found = simulate(scene, "analytic", "bdf2", FRAME, times)
     truth = simulate(scene, "analytic", "rk4", 2e-4 / 3, times)

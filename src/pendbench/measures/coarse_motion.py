@@ -78,7 +78,7 @@ def largest_rise(energy: FloatArray) -> float:
 
 
 def why_it_moves_badly(status: str, rise: float, gap: float, errors: CoarseErrors) -> str:
-    """What is wrong with a run, in a few words, the worst first; empty where it moves well.
+    """The first that is wrong with a run, in the order below, in a few words; empty where it moves well.
 
     status: how it ended. rise: `largest_rise` over the energy scale. gap: the worst rod's relative error in length.
     """
