@@ -21,7 +21,7 @@ def cost_figure(styles: Styles, scenes: Sequence[str], rows: Sequence[CaseRow], 
     title = "What accuracy costs, engine by engine"
     figure, panes = named_panels(scenes, title, "largest early error, in lengths of the chain", 3, 4.2, 3.4)
     across = bounds([row.cost_s_per_s for row in rows], 1e-9, 1e3)
-    up = bounds([row.run.error_early for row in rows] + [goal], 1e-15, 10.0)
+    up = bounds([row.run.error_early for row in rows] + [goal], 1e-17, 10.0)
     named: set[str] = set()
     for scene, axes in panes.items():
         logarithmic(axes, *across, "x")
@@ -37,6 +37,6 @@ def cost_figure(styles: Styles, scenes: Sequence[str], rows: Sequence[CaseRow], 
 
 def _draw(axes: Axes, styles: Styles, rows: Sequence[CaseRow], name: str | None) -> None:
     for row in rows:
-        look = styles.mark(row.case) | ({"marker": "x", "markersize": 7} if row.as_it_comes else {"markersize": 5})
+        look = styles.mark(row.case) | ({"marker": "X", "markersize": 8} if row.as_it_comes else {"markersize": 5})
         axes.plot(row.cost_s_per_s, row.run.error_early, **look, label=name)
         name = None
