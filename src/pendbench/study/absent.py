@@ -8,11 +8,12 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Final
 
 from pendbench.base.errors import InputError, MissingEngineError, printable
 from pendbench.base.processes import processors
-from pendbench.engines.registry import comes_along, engine
+from pendbench.engines.registry import comes_along, engine, is_foreign, python_of
 
 _HANGS_S: Final = 300.0
 _TOLD: Final = 3  # the exit code of a process that says why there is no such engine
@@ -55,6 +56,23 @@ def _why(name: str) -> str:
 
 
 def _why_apart(name: str) -> str:
+    """The same, as a process says that loads it. What can change under this one's feet is asked each time."""
+    return _ask(name) if is_foreign(name) or python_of(name) else _ask_once(name, _installed())
+
+
+def _installed() -> tuple[tuple[str, int], ...]:
+    """Where modules are found: each folder, and when something was last put there or taken away, ns."""
+    return tuple((path, os.stat(path).st_mtime_ns) for path in sys.path if os.path.isdir(path))
+
+
+@cache
+def _ask_once(name: str, installed: tuple[tuple[str, int], ...]) -> str:
+    """The answer for what is installed now: the processes take seconds, and a study may be read many times."""
+    del installed
+    return _ask(name)
+
+
+def _ask(name: str) -> str:
     command = [sys.executable, "-c", _LOAD, name]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     try:

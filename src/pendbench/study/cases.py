@@ -72,9 +72,10 @@ def cases_of(
         seen = set()
         for each in own:
             for case in _cases(scene, each, steps, fit=others):
-                if case.chosen in seen:
+                asked_for = case.engine, case.method, case.dt, case.settings
+                if asked_for in seen:
                     raise input_error(each.where, f"asks twice for {case}")
-                seen.add(case.chosen)
+                seen.add(asked_for)
                 yield case
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -295,10 +296,31 @@ def test_an_engine_that_crashes_or_hangs_as_it_is_loaded_is_absent_with_a_reason
     monkeypatch.setattr(absent, "_LOAD", code)
     monkeypatch.setattr(absent, "_HANGS_S", 1.0 if "wait" in code else 120.0)
     monkeypatch.setattr(absent, "engine", lambda name: SimpleNamespace(name=name))
+    absent._ask_once.cache_clear()
     found = why_absent(["pinocchio", "analytic"], apart=True)
+    absent._ask_once.cache_clear()
     assert "analytic" not in found
     assert found.get("pinocchio", "").endswith(said)
     assert bool(found.get("pinocchio")) == bool(said)
+
+
+def test_an_engine_is_asked_again_only_when_something_was_installed(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr(absent, "_ask", lambda name: asked.append(name) or "it is not here")
+    monkeypatch.setattr(absent, "is_foreign", lambda name: name == "mine")
+    monkeypatch.syspath_prepend(tmp_path)
+    for _ in range(2):
+        assert why_absent(["drake", "mine"], apart=True) == dict.fromkeys(("drake", "mine"), "it is not here")
+    assert sorted(asked) == ["drake", "mine", "mine"]  # whoever writes an engine changes it in place
+    (tmp_path / "pydrake").mkdir()
+    os.utime(tmp_path, ns=(0, 1))  # as later as a clock can tell
+    why_absent(["drake"], apart=True)
+    assert asked[3:] == ["drake"]
+    monkeypatch.setattr(absent, "python_of", lambda _: "/elsewhere/bin/python")
+    why_absent(["drake"], apart=True)
+    why_absent(["drake"], apart=True)
+    assert asked[4:] == ["drake", "drake"]
+    absent._ask_once.cache_clear()
 
 
 def test_lines_of_code_are_counted_without_comments_and_empty_lines(monkeypatch):
