@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -137,33 +138,47 @@ MODULES = {short(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 INSIDE = sorted(set(MODULES) - {""})
 
 
-def imports(path: Path) -> set[str]:
+def imports(path: Path) -> frozenset[str]:
     """All that a file imports, inside functions and for types as well, with full names."""
+    return _imports(path.read_text("utf-8"))
+
+
+@cache
+def _imports(text: str) -> frozenset[str]:
     found = set()
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: a relative import"
+            assert node.level == 0, f"a relative import: {ast.unparse(node)}"
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("pendbench."):
             found.add(node.value.replace(":", "."))  # loaded by its name
-    return found
+    return frozenset(found)
 
 
 def ours(path: Path) -> set[str]:
-    """The modules of the package that a file imports; of ``a.b.name`` the longest part that is a module."""
+    """The modules of the package that a file imports; of ``a.b.name`` the longest part that is a module.
+
+    A public name is of the module that it is from, and the package as a whole holds all of them.
+    """
     found = set()
     for name in imports(path):
         parts = name.split(".")
         if parts[0] == "pendbench":
             inner = [".".join(parts[1:end]) for end in range(len(parts), 1, -1)]
-            found |= set([module for module in inner if module in MODULES][:1])
+            public = [_public(parts[1])] if len(parts) > 1 else map(_public, pendbench.__all__)
+            found |= set([module for module in inner if module in MODULES][:1] or filter(None, public))
     return found
 
 
-def libraries(path: Path) -> set[str]:
-    return {name.partition(".")[0] for name in imports(path)} - {"pendbench"}
+def _public(name: str) -> str:
+    """The module that a public name is from."""
+    return pendbench._HOMES.get(name, "").removeprefix("pendbench.")
+
+
+def libraries(path: Path) -> frozenset[str]:
+    return frozenset(name.partition(".")[0] for name in imports(path)) - {"pendbench"}
 
 
 def within(module: str, part: str) -> bool:
@@ -248,3 +263,14 @@ def test_imports_are_seen_wherever_they_are(tmp_path):
     )
     assert ours(file) == {"report.names", "physics.dense", "commands.run", "engines.mujoco.adapter", "truth.reference"}
     assert libraries(file) == {"os", "typing"}
+
+
+def test_public_names_are_imports_of_where_they_are_from(tmp_path):
+    file = tmp_path / "a.py"
+    file.write_text("from pendbench import __version__\ndef f():\n    from pendbench import show, Scene\n")
+    assert ours(file) == {"commands.showing", "scene.scene"}
+    for whole in ("import pendbench\n", "import pendbench as pb\n"):
+        file.write_text(whole)
+        assert {"commands.showing", "scene.scene", "truth.reference"} <= ours(file)
+    file.write_text("import pendbench.solvers\n")
+    assert ours(file) == {"solvers"}

@@ -5,7 +5,9 @@ module has the name of a public function: importing the one would hide the other
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from pendbench.base.notebook import show_with
 
 __version__ = "0.1.0"
 
@@ -72,10 +74,14 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)
+
+
+# A run of a low room shows itself by what is built on it: it is told here, where both are known.
+show_with(lambda run: __getattr__("show")(run)._repr_html_())
 
 
 def __dir__() -> list[str]:

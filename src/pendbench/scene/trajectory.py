@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from pendbench.base.arrays import FloatArray
 from pendbench.base.errors import InputError
 from pendbench.base.faults import STATUSES
+from pendbench.base.notebook import shown
 from pendbench.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -74,10 +75,8 @@ class Trajectory:
 
     def _repr_html_(self) -> str | None:
         """The run in motion, for a notebook; None, so that it shows the text, where there is nothing to be shown."""
-        from pendbench import show  # pages are made by rooms above this one: they are asked by the public name
-
         try:
-            return show(self)._repr_html_()
+            return shown(self)
         except InputError:
             return None
 
