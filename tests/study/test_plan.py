@@ -242,6 +242,27 @@ def test_other_scenes_that_a_study_cannot_use(kind, names, said):
     assert said in refusal(kind, scenes=[load_scene(name) for name in names])
 
 
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("judge", "scene 'long' lasts 1e+08 s; allowed: up to 1e+06 s, 1e+12 steps of 1e-06 s"),
+        ("cost", "scene 'long' lasts 1e+08 s; allowed: up to 5e+07 s, 1e+12 steps of 5e-05 s"),
+        ("chaos", "sample is 0.01; allowed: from 100 s, for the 1e+08 s of scene 'long', or a scene of up to 10000 s"),
+    ],
+)
+def test_a_scene_that_is_too_long_is_told_so_and_no_table_that_nobody_wrote(kind, said):
+    long = replace(load_scene("double"), name="long", duration=1e8)
+    assert refusal(kind, scenes=[long]).endswith(f"{kind}.toml: {said}")
+
+
+def test_a_scene_too_long_for_steps_that_its_study_does_not_name(tmp_path, write):
+    (tmp_path / "long.toml").write_text(SHORT.replace("0.05", "2e8"))
+    allowed = "allowed: up to 1e+08 s, 1e+12 steps of 0.0001 s"
+    for engines in ("", "\n[[engines]]\nname = 'mujoco'"):
+        path = write(f'scenes = ["long.toml"]{engines}')
+        assert refusal(path).endswith(f"mine.toml: scene 'long' lasts 2e+08 s; {allowed}")
+
+
 @pytest.mark.parametrize("name", ["arm.xml", "there/arm.URDF"])
 def test_a_model_is_no_study(name):
     instead = f"pendbench judge {name}, or pendbench study chaos --scenes {name}"

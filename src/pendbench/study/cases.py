@@ -57,11 +57,11 @@ def _check_loading(tables: Sequence[Placed]) -> None:
 
 
 def cases_of(
-    scenes: Sequence[Scene], tables: Sequence[Placed], steps: Sequence[float], others: bool = False
+    where: str, scenes: Sequence[Scene], tables: Sequence[Placed], steps: Sequence[float], others: bool = False
 ) -> Iterator[Case]:
-    """All cases. steps: s, where a table has none. others: the scenes are not the file's own, but those of --scenes.
+    """All cases. where: the study's file. steps: s, where a table has none. others: the scenes are those of --scenes.
 
-    Raises InputError, naming the table, for what makes no sense.
+    Raises InputError, naming the table, or the scene that it is not about, for what makes no sense.
     """
     asked = [each for at, table in tables for each in _asked(at, table)]
     known = [scene.name for scene in scenes]
@@ -71,7 +71,7 @@ def cases_of(
         own = _for_other(asked) if others and not _is_named(scene, tables) else _for_own(scene, asked)
         seen = set()
         for each in own:
-            for case in _cases(scene, each, steps, fit=others):
+            for case in _cases(where, scene, each, steps, fit=others):
                 asked_for = case.engine, case.method, case.dt, case.settings
                 if asked_for in seen:
                     raise input_error(each.where, f"asks twice for {case}")
@@ -103,8 +103,11 @@ def _for_other(asked: Sequence[Asked]) -> Iterator[Asked]:
         seen.add(pair)
 
 
-def _cases(scene: Scene, asked: Asked, steps: Sequence[float], *, fit: bool) -> Iterator[Case]:
-    """The cases of a method in a scene. fit: leave out the steps that the scene is too short for."""
+def _cases(where: str, scene: Scene, asked: Asked, steps: Sequence[float], *, fit: bool) -> Iterator[Case]:
+    """The cases of a method in a scene. fit: leave out the steps that the scene is too short for.
+
+    Of steps that were not chosen for the scene, it is the scene that is too long.
+    """
     given = asked.table.dt
     chosen: Sequence[float | None] = [None] if asked.adaptive else given or steps
     if not asked.adaptive and (fit or given is None):
@@ -113,6 +116,9 @@ def _cases(scene: Scene, asked: Asked, steps: Sequence[float], *, fit: bool) -> 
         case = Case(scene, asked.table.name, asked.method, dt, settings)
         if dt is not None and not 1 - 1e-9 <= scene.duration / dt <= _MOST_STEPS:
             least, most = scene.duration / _MOST_STEPS, scene.duration
+            if given is None or fit:
+                allowed = f"up to {dt * _MOST_STEPS:g} s, {_MOST_STEPS:g} steps of {dt:g} s"
+                raise input_error(where, f"scene {scene.name!r} lasts {most:g} s; allowed: {allowed}")
             allowed = f"{least:.3g} to {most:g} s, for the {most:g} s of scene {scene.name!r}"
             raise input_error(asked.where, f"dt is {dt:g}; allowed: {allowed}")
         yield case

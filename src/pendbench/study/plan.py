@@ -97,7 +97,7 @@ def load_plan(
     if absent and all(table.name in absent for _, table in tables):
         raise InputError(f"--engines: {', '.join(absent)}: not installed, and no other engine was asked for")
     present = [(at, table) for at, table in tables if table.name not in absent]
-    cases = tuple(cases_of(chosen, present, its.Options.STEPS, others=bool(scenes)))
+    cases = tuple(cases_of(where, chosen, present, its.Options.STEPS, others=bool(scenes)))
     idle = {scene.name for scene in chosen} - {case.scene.name for case in cases}
     if idle and not engines:
         raise input_error(where, f"scenes has {min(idle)!r}, and no table of [[engines]] is for it")

@@ -90,11 +90,11 @@ def starts_of(scene: Scene, options: Options) -> list[Scene]:
 def check(plan: Plan) -> None:
     """Raise InputError where the samples would be too many."""
     for scene in plan.scenes:
-        if scene.duration / plan.options.sample > _MOST_SAMPLES:
-            allowed = (
-                f"from {scene.duration / _MOST_SAMPLES:.3g} s, for the {scene.duration:g} s of scene {scene.name!r}"
-            )
-            raise input_error(plan.where, f"sample is {plan.options.sample:g}; allowed: {allowed}")
+        sample, lasts = plan.options.sample, scene.duration
+        if lasts / sample > _MOST_SAMPLES:
+            allowed = f"from {lasts / _MOST_SAMPLES:.3g} s, for the {lasts:g} s of scene {scene.name!r}"
+            other = f"or a scene of up to {sample * _MOST_SAMPLES:g} s"
+            raise input_error(plan.where, f"sample is {sample:g}; allowed: {allowed}, {other}")
 
 
 def measure(plan: Plan, runner: Runner) -> Found:
