@@ -19,8 +19,10 @@ from pendbench.commands.gate_formats import annotation_lines, badge_text, junit_
 from pendbench.commands.gate_record import Gate, json_text, read_gate
 from pendbench.commands.gating import run_gate
 from pendbench.engines.conformance.check import Finding
+from pendbench.engines.gating import gate as gating
 from pendbench.engines.gating.functions import FunctionEngine
 from pendbench.engines.gating.gate import Asked, names_of_checks
+from pendbench.execution.pool import Job
 from support import gate_engines
 
 ROOT = Path(__file__).parents[2]
@@ -63,11 +65,18 @@ def test_a_right_engine_passes(right):
         ("raising", "error", "raised RuntimeError: five is too many"),
         ("leaving", "error", "tried to exit the program (SystemExit: 3)"),
         ("crashing", "error", "crashed: the process died with exit code 3"),
-        ("hanging", "error", "timed out: took longer than "),
-        ("sleeping", "error", "timed out: took longer than 50 s by the clock"),
+        ("hanging", "error", "timed out: took longer than 1 s of processor time"),
+        ("sleeping", "error", "timed out: took longer than 3 s by the clock"),
     ],
 )
-def test_what_an_engine_does_to_one_check_is_said_there_and_the_others_are_asked(name, status, cause):
+def test_what_an_engine_does_to_one_check_is_said_there_and_the_others_are_asked(monkeypatch, name, status, cause):
+    def job(key, function, arguments, time_limit, *, wall_limit):
+        assert (time_limit, wall_limit) == (5.0, 50.0)
+        if key == "rk4:owns up":  # these two use up any limit, so a short one will do
+            time_limit, wall_limit = {"hanging": (1.0, 50.0), "sleeping": (5.0, 3.0)}.get(name, (5.0, 50.0))
+        return Job(key, function, arguments, time_limit, wall_limit=wall_limit)
+
+    monkeypatch.setattr(gating, "Job", job)
     gate = asked(f"support.gate_engines:{name}")
     found = by_check(gate)
     assert found["owns up"].status == status
