@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from pendbench.base.errors import InputError
@@ -12,13 +14,16 @@ from pendbench.commands.run import run_study
 from pendbench.engines.registry import engine
 from pendbench.kinds.scaling.plots import longest_figure
 from pendbench.kinds.scaling.search import FINER
-from pendbench.kinds.scaling.study import chain_of, measure
+from pendbench.kinds.scaling.study import _open, chain_of, measure, titles_of
 from pendbench.kinds.scaling.work import RaceRun, StepCost, _memory_taken, measure_race, measure_step_cost
 from pendbench.measures.clock import race
+from pendbench.measures.coarse_motion import CoarseErrors
+from pendbench.measures.known_motion import Known, measure_known
+from pendbench.measures.titles import TITLES, Shown
 from pendbench.physics.energy import energy_scale
 from pendbench.report.page import Report
 from pendbench.report.styles import Styles
-from pendbench.scene.scene import load_scene
+from pendbench.scene.scene import Effects, load_scene
 from pendbench.study.case import Case
 from pendbench.study.plan import load_plan
 from pendbench.study.results import Results
@@ -51,9 +56,30 @@ def folder(tmp_path_factory):
     return path
 
 
+OFF = CoarseErrors(0.5, 0.5, 0.5)
+ON = CoarseErrors(0.0, 0.0, 0.0)
+
+
 def searched(folder, fastest, steady, stops=math.inf, beyond="too slow", noise=0.0):
-    """A report where trials hold up to `fastest` links and a step of `steady` / n s, and steps cost 2 n^1.5 us."""
+    """A report where trials win all titles up to `fastest` links and a step of `steady` / n s, and steps cost
+    2 n^1.5 us; with what was raced: method, links, step.
+    """
     raced = []
+
+    def race(case, _every, _titles):
+        n, dt = case.scene.n, case.dt or 0.0
+        raced.append((case.method, n, case.dt))
+        lost = 1.0 if dt * n > steady else 0.0
+        late = 2.0 if n > fastest and beyond == "too slow" else 0.5
+        if not lost and n > fastest and beyond != "too slow":
+            return RaceRun(beyond, beyond)
+        return RaceRun("ok", "", Shown(1.0, 1.0, late, strays=lost, risen=lost, error=lost, coarse=ON))
+
+    return reported(folder, race, stops, noise), raced
+
+
+def reported(folder, race, stops=math.inf, noise=0.0):
+    """The report of a study whose trials fare as `race` says."""
 
     def cost(case, _step, _steps):
         n = case.scene.n
@@ -61,19 +87,15 @@ def searched(folder, fastest, steady, stops=math.inf, beyond="too slow", noise=0
             return StepCost("timed out", "x")
         return StepCost("ok", timing=Timed("ok", step_us=2.0 * n**1.5, step_spread=noise))
 
-    def race(case):
-        n, dt = case.scene.n, case.dt or 0.0
-        raced.append((case.method, n, case.dt))
-        outcome = "lost" if dt * n > steady else "held" if n <= fastest else beyond
-        return RaceRun("ok", outcome, outcome, 1.0, 1.0, 0.0)
-
     plan = load_plan(folder / "small.toml")
-    found = measure(plan, Oracle({measure_step_cost: cost, measure_race: race}))
-    return Report(Results(plan.name, "T", "scaling", found, plan.options, quick=True)), raced
+    answers = {measure_step_cost: cost, measure_race: race, measure_known: lambda *_: Known("ok")}
+    found = measure(plan, Oracle(answers))
+    return Report(Results(plan.name, "T", "scaling", found, plan.options, quick=True))
 
 
-def by_method(report, table):
-    return {row.case.method: row for row in report.tables[table]}
+def by_method(report, table, title="energy"):
+    rows = [row for row in report.tables[table] if table == "growth" or row.title == title]
+    return {row.case.method: row for row in rows}
 
 
 @pytest.mark.parametrize("fastest", [8, 100, 777, 12_345])
@@ -82,7 +104,7 @@ def test_longest_chain_is_found_to_a_tenth(folder, fastest):
     for row in report.tables["longest"]:
         assert fastest / 1.1 - 1 <= row.longest_n <= fastest
         assert row.longest_n < row.next_n
-        assert (row.beyond.outcome, row.bound) == ("too slow", False)
+        assert (row.outcome, row.bound) == ("too slow", False)
 
 
 def test_step_of_the_longest_chain_is_near_the_coarsest_that_holds(folder):
@@ -102,7 +124,7 @@ def test_chain_that_no_step_keeps_is_none(folder):
     report, raced = searched(folder, fastest=1000, steady=0.0)
     rk4 = by_method(report, "longest")["rk4"]
     assert math.isnan(rk4.longest_n)
-    assert (rk4.beyond.outcome, rk4.bound) == ("lost", False)
+    assert (rk4.outcome, rk4.bound) == ("lost", False)
     assert min(dt for method, _, dt in raced if method == "rk4") >= 1e-5
     assert {n for method, n, _ in raced if method == "rk4"} == {8, 4, 2, 1}
     assert "no step below 1e-05 s is tried" in rk4.reason
@@ -118,7 +140,91 @@ def test_length_is_a_bound_where_something_else_than_the_chain_ended_the_search(
     report, _ = searched(folder, fastest=100, steady=0.5, beyond=outcome)
     for row in report.tables["longest"]:
         assert row.bound
-        assert f"analytic {row.case.method}" not in report.answer or f"at least {row.longest_n}" in report.answer
+        assert (row.outcome, row.reason) == (outcome, outcome)
+        assert f"analytic {row.case.method} {row.longest_n}" not in report.answer
+
+
+#: Per n / dt, what a second takes; and the step times n, s, up to which the titles are held, in their order.
+PRICE, STEADY = 1e-7, (4e-3, 0.05, 0.2)
+
+
+def titled(case, _every, titles):
+    """A run that costs PRICE n / dt, and shows no more than its titles ask for: with any title lost it ends early."""
+    n, dt = case.scene.n, case.dt or 1e-4 / case.scene.n
+    unfaithful, strays, badly = (n * dt > steady for steady in STEADY)
+    spent, lost = PRICE * n / dt, {"faithful": unfaithful or strays, "energy": strays, "moves well": badly}
+    reached = 0.5 if all(lost[name] for name in titles) else min(1.0, 1.01 / spent)
+    error = 0.5 if unfaithful else 0.0
+    coarse = OFF if badly else ON
+    return RaceRun(
+        "ok",
+        "",
+        Shown(1.0, reached, reached * spent, strays=0.3 * strays, lost=0.3 * strays, error=error, coarse=coarse),
+    )
+
+
+def test_each_title_has_its_own_longest_chain(folder):
+    """With the step steady / n, a second takes PRICE n^2 / steady: so the longest has sqrt(steady / PRICE) links."""
+    report = reported(folder, titled)
+    for title, steady in zip(TITLES, STEADY, strict=True):
+        row, best = by_method(report, "longest", title.name)["rk4"], math.sqrt(steady / PRICE)
+        assert best / (1.1 * math.sqrt(FINER)) <= row.longest_n <= best
+        assert row.outcome == "too slow"
+        assert steady / FINER**2 <= row.dt * row.longest_n <= steady
+        assert (row.shown.strays > 0.01) == (title.name == "moves well")
+
+
+def test_titles_share_runs(folder):
+    raced = {}
+
+    def race(case, every, titles):
+        raced.setdefault((case.method, case.scene.n, case.dt), []).append(titles)
+        return titled(case, every, titles)
+
+    report = reported(folder, race)
+    assert next(iter(raced.values())) == [tuple(title.name for title in TITLES)]
+    assert sum(map(len, raced.values())) < len(report.tables["trials"])
+
+
+def test_a_run_that_ended_too_early_for_a_title_is_run_again():
+    """It lost its energy half way, and what it may still move like is not known."""
+    case, (_, energy, well) = Case(chain(1), "analytic", "rk4", 1e-3), TITLES
+    early = RaceRun("ok", "", Shown(1.0, 0.5, 0.1, strays=0.5, coarse=ON))
+    asked, runs = {(case, energy): (8, 0.1), (case, well): (8, 0.1)}, {(case, 8, 0.1): early}
+    assert _open(asked, {}) == {(case, 8, 0.1): [energy, well]}
+    assert _open(asked, runs) == {(case, 8, 0.1): [well]}
+    assert not _open(asked, {(case, 8, 0.1): RaceRun("crashed")})
+    assert not _open(asked, {(case, 8, 0.1): replace(early, shown=replace(early.shown, reached=1.0))})
+
+
+def test_a_chain_whose_energy_is_lost_may_still_move_well(folder):
+    """The sentence and its table say how much of it."""
+
+    def race(case, _every, _titles):
+        n = case.scene.n
+        return RaceRun("ok", "", Shown(1.0, 1.0, n / 100, strays=0.24, lost=0.24, error=0.0, coarse=ON))
+
+    answer = reported(folder, race).answer
+    assert re.search(r"; moves well: analytic \w+ (9[1-9]|100) \(of the energy 24% lost\) links\.", answer)
+    for name in ("faithful", "energy"):
+        assert re.search(rf"; {name}: analytic \w+ none links", answer)
+
+
+def test_what_is_not_known_is_a_bound(folder):
+    def race(case, _every, _titles):
+        error = math.nan if case.scene.n > 50 else 0.0
+        return RaceRun("ok", "", Shown(1.0, 1.0, case.scene.n / 100, error=error, coarse=ON))
+
+    report = reported(folder, race)
+    faithful, energy = (by_method(report, "longest", name)["rk4"] for name in ("faithful", "energy"))
+    assert (faithful.outcome, faithful.bound, energy.bound) == ("not known", True, False)
+    assert 50 / 1.1 <= faithful.longest_n <= 50
+
+
+def test_no_title_is_asked_for_an_energy_that_never_rises_where_something_damps():
+    damped = replace(chain(2), effects=Effects(gravity=9.81, joint_damping=0.1))
+    assert [title.name for title in titles_of(damped)] == ["faithful", "energy"]
+    assert len(titles_of(chain(2))) == 3
 
 
 def test_length_is_a_bound_where_the_finest_step_ended_the_search(folder):
@@ -139,18 +245,19 @@ def test_links_share_the_step_of_one(folder):
 
 def test_the_answer_s_numbers_are_those_of_its_table(folder):
     report, _ = searched(folder, fastest=100, steady=0.5)
-    heading, row = cells_of(section(report.markdown(), "The answer"))
-    shown = dict(zip(heading, row, strict=True))
-    [name, length] = re.findall(r"1 %: (\w+ \w+) (\d+) links", report.answer)[0]
-    assert (shown["method"], shown["longest chain"]) == (name, length)
+    heading, *rows = cells_of(section(report.markdown(), "The answer"))
+    shown = {row[0]: dict(zip(heading, row, strict=True)) for row in rows}
+    for title in TITLES:
+        [name, length] = re.findall(rf"{title.name}: (\w+ \w+) (\d+)", report.answer)[0]
+        assert (shown[title.name]["method"], shown[title.name]["longest chain"]) == (name, length)
     [exponent] = re.findall(rf"power of: {name} ([\d.]+) ±", report.answer)
-    assert shown["exponent"] == exponent == "1.50"
+    assert shown["energy"]["exponent"] == exponent == "1.50"
 
 
 @pytest.mark.parametrize(("noise", "told"), [(0.05, False), (0.2, True)])
 def test_noisy_timings_are_said_to_be_noisy(folder, noise, told):
     report, _ = searched(folder, fastest=100, steady=0.5, noise=noise)
-    assert ("timings are noisy" in report.answer) == told
+    assert ("some timings are noisy" in report.answer) == told
     row = cells_of(section(report.markdown(), "The answer"))[1]
     assert row[-2:] == ["4" if told else "0", "4"]
     assert {row.flags for row in report.cases} == {"noisy timing: spread 20%" if told else ""}
@@ -165,11 +272,14 @@ def test_longest_chains_have_the_engine_s_colour_and_bounds_are_marked(folder):
     for outcome, told in (("too slow", ""), ("crashed", "at least ")):
         rows = list(searched(folder, fastest=100, steady=0.5, beyond=outcome)[0].tables["longest"])
         styles = Styles.of_cases(row.case for row in rows)
-        [axes] = longest_figure(styles, rows).axes
-        ordered = sorted(rows, key=lambda row: row.longest_n)
-        assert [text.get_text() for text in axes.texts] == [f"{told}{row.longest_n}" for row in ordered]
-        assert [bar.get_facecolor()[:3] for bar in axes.patches] == [styles.colour(row.case) for row in ordered]
-        assert {bool(bar.get_hatch()) for bar in axes.patches} == {bool(told)}
+        panels = longest_figure(styles, rows).axes
+        assert [axes.get_title() for axes in panels] == [title.name for title in TITLES]
+        for axes in panels:
+            own = [row for row in rows if row.title == axes.get_title()]
+            ordered = sorted(own, key=lambda row: row.longest_n)
+            assert [text.get_text() for text in axes.texts] == [f"{told}{row.longest_n}" for row in ordered]
+            assert [bar.get_facecolor()[:3] for bar in axes.patches] == [styles.colour(row.case) for row in ordered]
+            assert {bool(bar.get_hatch()) for bar in axes.patches} == {bool(told)}
 
 
 def test_memory_is_that_of_a_run_that_is_there():
@@ -231,14 +341,22 @@ def test_pattern_keeps_its_mass_and_its_length():
 def test_race_stops_where_the_energy_is_lost():
     scene = load_scene("chain10")
     analytic, asked = engine("analytic"), []
-    found = race(analytic, scene, "rk4", 0.01, {}, 100, lambda _, state: asked.append(state) or len(asked) == 7)
+    found = race(
+        analytic,
+        scene,
+        "rk4",
+        0.01,
+        {},
+        0.1 * np.arange(1, 101),
+        lambda _, state: asked.append(state) or len(asked) == 7,
+    )
     assert found.lost
     assert found.reached == pytest.approx(0.7)
     assert energy_scale(scene) > 0
 
 
 def test_race_against_a_method_that_chooses_its_steps():
-    found = race(engine("analytic"), load_scene("single"), "taylor", None, {}, 10, lambda *_: False)
+    found = race(engine("analytic"), load_scene("single"), "taylor", None, {}, np.arange(1.0, 11.0), lambda *_: False)
     assert (found.reached, found.lost) == (10.0, False)
     assert 0 < found.spent < 10
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from pendbench.base.faults import Fault
@@ -131,7 +132,10 @@ def test_a_sample_of_whole_runs_is_as_many_as_fill_it_and_a_hundred_at_most(monk
 def ticking(monkeypatch, kind, slowness=1.0):
     """An engine of such runs, and the clock that they wind."""
     watch = SimpleNamespace(now=0.0)
-    monkeypatch.setattr(clock, "time", SimpleNamespace(perf_counter=lambda: watch.now))
+    clocks = SimpleNamespace(
+        process_time=lambda: watch.now, thread_time=lambda: watch.now, perf_counter=lambda: watch.now
+    )
+    monkeypatch.setattr(clock, "time", clocks)
     return SimpleNamespace(build=lambda *_, **__: kind(watch, slowness)), watch
 
 
@@ -205,33 +209,42 @@ class RacingWhole:
         self._inner.advance(round((time - self._inner.age) / 0.01))
 
 
+TENTHS = 0.1 * np.arange(1, 11)
+
+
 @pytest.mark.parametrize(("kind", "dt"), [(Racing, 0.01), (RacingWhole, None)])
 @pytest.mark.parametrize(
     ("cost", "ill", "lost_at", "expected"),
     [
         (0.005, 9.0, 9.0, Race(1.0, 0.5, lost=False)),  # 100 steps of 5 ms
         (0.01, 9.0, 9.0, Race(1.0, 1.0, lost=False)),
-        (0.03, 9.0, 9.0, Race(0.4, 1.2, lost=False)),  # in ten parts: at 0.3 s it is 0.9 s, and 1.2 s at the next
+        (0.03, 9.0, 9.0, Race(0.4, 1.2, lost=False)),  # at 0.3 s it is 0.9 s, and 1.2 s at the next
         (0.005, 0.45, 9.0, Race(0.5, 0.25, lost=True, fault=FAULT)),
         (0.005, 9.0, 0.65, Race(0.7, 0.35, lost=True)),
     ],
 )
 def test_a_race_goes_to_the_end_or_until_it_is_late_or_lost(monkeypatch, kind, dt, cost, ill, lost_at, expected):
     engine, _ = ticking(monkeypatch, kind, (cost, ill))
-    found = race(engine, SCENE, "any", dt, {}, 10, lambda _, age: age > lost_at)
+    found = race(engine, SCENE, "any", dt, {}, TENTHS, lambda _, age: age > lost_at)
     assert found[:2] == pytest.approx(expected[:2])
     assert found[2:] == expected[2:]
 
 
-def test_a_race_of_few_steps_is_looked_at_after_each(monkeypatch):
-    """Three steps of 0.3 s are the nearest to 1 s, and of 3 s one step is all."""
-    ages: list[float] = []
+def test_a_race_takes_the_steps_up_to_each_time_and_says_which_it_is(monkeypatch):
+    """Steps of 0.3 s: two to 0.6 s, and three more to 1.5 s."""
+    seen: list[tuple[float, float]] = []
     engine, _ = ticking(monkeypatch, Racing, (0.1, 9.0))
-    assert race(engine, SCENE, "any", 0.3, {}, 10, lambda _, age: bool(ages.append(age)))[:2] == pytest.approx(
-        (0.9, 0.3)
-    )
-    assert ages == pytest.approx([0.01, 0.02, 0.03])
-    assert race(engine, SCENE, "any", 3.0, {}, 10, lambda *_: False)[:2] == pytest.approx((3.0, 0.1))
+    found = race(engine, SCENE, "any", 0.3, {}, np.array([0.6, 1.5]), lambda *each: bool(seen.append(each)))
+    assert found[:2] == pytest.approx((1.5, 0.5))
+    assert seen == [pytest.approx((0.6, 0.02)), pytest.approx((1.5, 0.05))]
+
+
+@pytest.mark.parametrize(("own", "spent"), [(0.0095, 0.95), (0.005, 1.0), (0.0, 1.0)])
+def test_other_threads_count_in_a_race_and_ticks_do_not(monkeypatch, own, spent):
+    """100 steps of 10 ms of the process, of which the thread had so much."""
+    engine, watch = ticking(monkeypatch, Racing, (0.01, 9.0))
+    monkeypatch.setattr(clock.time, "thread_time", lambda: own / 0.01 * watch.now)
+    assert race(engine, SCENE, "any", 0.01, {}, TENTHS, lambda *_: False).spent == pytest.approx(spent)
 
 
 def test_a_call_is_timed_by_the_processor(monkeypatch):

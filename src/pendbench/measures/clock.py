@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Callable
 from functools import partial
@@ -10,6 +9,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from pendbench.base.arrays import FloatArray
 from pendbench.base.faults import Fault
 from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation, State
 from pendbench.scene.scene import Scene
@@ -19,6 +19,7 @@ T = TypeVar("T")
 REPEATS = 5
 _READINGS = 200
 _MOST_RUNS = 100  # that are put together for one sample, where each is short
+_OTHERS, _TICKS = 1.2, 0.1  # of a thread's own time, and s, beyond which a process's time is that of others, too
 _SAMPLE_S = 0.01  # a sample shorter than this is mostly the clock's own noise
 
 
@@ -138,7 +139,7 @@ def time_each_step(
 
 
 class Race(NamedTuple):
-    """How far a run came against the clock: simulated time reached and time spent stepping, s, and whether it was lost.
+    """How far a run came: simulated time reached, processor time spent stepping, s, and whether it was lost.
 
     lost: `is_lost` said so of a sample's time (s) and state, or the engine said that something was wrong: fault.
     """
@@ -155,29 +156,52 @@ def race(
     method: str,
     dt: float | None,
     settings: dict[str, float],
-    samples: int,
+    times: FloatArray,
     is_lost: Callable[[float, State], bool],
 ) -> Race:
-    """Run the scene for its duration, or until it has taken as long, or until it is lost; only stepping is timed."""
+    """Run the scene until stepping has taken longer than all of the motion lasts, or until it is lost.
+
+    times: (k,) s, rising, at which it is looked at, the last of them its end; with a fixed step multiples of it. It is
+    processor time that counts, of the steps alone: whatever else the machine does, the verdict is the same.
+    """
     simulation = engine.build(scene, method, dt, **settings)
-    total = samples if dt is None else max(1, round(scene.duration / dt))
-    marks = np.unique(np.linspace(0, total, samples + 1).round().astype(int))
-    unit = scene.duration / samples if dt is None else dt
-    spent, reached = 0.0, 0.0
-    for before, mark in itertools.pairwise(marks.tolist()):
-        begun = time.perf_counter()
-        if isinstance(simulation, Simulation):
-            simulation.advance(mark - before)
-        else:
-            simulation.advance_to(mark * unit)
-        spent += time.perf_counter() - begun
-        reached = mark * unit
+    watch, taken = _Stopwatch(), 0
+    for moment in times.tolist():
+        steps = 0 if dt is None else round(moment / dt) - taken
+        with watch:
+            if isinstance(simulation, Simulation):
+                simulation.advance(steps)
+            else:
+                simulation.advance_to(moment)
+        taken += steps
         fault = simulation.health()
-        if fault is not None or is_lost(reached, simulation.state()):
-            return Race(reached, spent, lost=True, fault=fault)
-        if spent > scene.duration:
-            break
-    return Race(reached, spent, lost=False)
+        if fault is not None or is_lost(moment, simulation.state()):
+            return Race(moment, watch.spent, lost=True, fault=fault)
+        if watch.spent > times[-1]:
+            return Race(moment, watch.spent, lost=False)
+    return Race(float(times[-1]), watch.spent, lost=False)
+
+
+class _Stopwatch:
+    """Processor time of blocks, s. Where a process has a limit of it, its clock goes by the system's ticks of some
+    milliseconds; that of a thread does not, and is taken unless other threads have worked as well.
+    """
+
+    def __init__(self) -> None:
+        self._own, self._whole = 0.0, 0.0
+
+    def __enter__(self) -> None:
+        self._begun = time.thread_time(), time.process_time()
+
+    def __exit__(self, *_: object) -> None:
+        own, whole = self._begun
+        self._own += time.thread_time() - own
+        self._whole += time.process_time() - whole
+
+    @property
+    def spent(self) -> float:
+        """So far."""
+        return self._whole if self._whole > _OTHERS * self._own + _TICKS else self._own
 
 
 def timed(call: Callable[[], T]) -> tuple[T, float]:

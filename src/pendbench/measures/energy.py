@@ -160,17 +160,23 @@ def times_to_balance(scene: Scene, dt: float | None, times: FloatArray) -> Float
 
 
 class Meter:
-    """The balance of a run as it goes on, from the scene's start; what needs no past keeps none."""
+    """The balance of a run as it goes on, from the scene's start; what needs no past keeps none.
+
+    lost, risen: by how much the energy itself is below its first value, and at most was above any value before, in
+    units of its scale; nan where it is not finite.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._works, self._scale = scene, not conserves_energy(scene), energy_scale(scene)
         self._first = float(energy(scene, scene.angles, scene.rates))
         self._t, self._values, self._given = [0.0], [self._first], [self._power(0.0, scene.angles, scene.rates)]
+        self.lost, self.risen, self._lowest = 0.0, 0.0, self._first
 
     def add(self, t: float, theta: FloatArray, omega: FloatArray) -> float:
         """By how much the energy is astray for certain at t, s, in units of its scale, with the state there."""
         with np.errstate(over="ignore", invalid="ignore"):
             value = float(energy(self._scene, theta, omega))
+            self._note(value)
             if not self._works:
                 return abs(value - self._first) / (self._scale or 1.0)
             self._t.append(t)
@@ -178,6 +184,13 @@ class Meter:
             self._given.append(self._power(t, theta, omega))
         past = np.array(self._t), np.array(self._values), np.array(self._given)
         return float(balance_of(*past, self._scale).excess[-1])
+
+    def _note(self, value: float) -> None:
+        scale = self._scale or 1.0
+        self.lost = (self._first - value) / scale if math.isfinite(value) else math.nan
+        self._lowest = min(self._lowest, value)
+        rise = (value - self._lowest) / scale
+        self.risen = max(self.risen, rise) if math.isfinite(value + self.risen) else math.nan
 
     def _power(self, t: float, theta: FloatArray, omega: FloatArray) -> float:
         return float(power(self._scene, t, theta, omega)) if self._works else 0.0

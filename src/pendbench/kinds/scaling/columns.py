@@ -11,8 +11,9 @@ import numpy as np
 
 from pendbench.kinds.scaling.search import Trial, best_of, nearest_beyond
 from pendbench.kinds.scaling.study import Found, Options, Racer
-from pendbench.kinds.scaling.work import RaceRun, StepCost
+from pendbench.kinds.scaling.work import StepCost
 from pendbench.measures.orders import Growth, growth_exponent
+from pendbench.measures.titles import Shown
 from pendbench.report import columns as common
 from pendbench.report.columns import Column, Table, energy_drift, tables_of, text_column, within
 from pendbench.report.names import OfRun
@@ -63,25 +64,28 @@ class GrowthRow:
 
 @dataclass(frozen=True)
 class LongestRow:
-    """The longest chain in real time, nan links where there is none. bound: whether something else than the chain ended
-    the search, so that it is at least as long. next_n: of the shortest chain beyond it, which fared as `beyond` says.
+    """The longest chain of a method with a title, nan links where there is none. shown: by it. bound: whether something
+    else than the chain ended the search, so that it is at least as long. next_n: of the shortest chain beyond it, which
+    fared as `outcome` and `reason` say.
     """
 
     case: Case
+    title: str
     longest_n: float
     dt: float
-    run: RaceRun
+    shown: Shown
     bound: bool
     next_n: float
-    beyond: RaceRun
+    outcome: str
     reason: str
 
 
 @dataclass(frozen=True)
 class TrialRow:
-    """A chain against the clock."""
+    """A chain against the clock, for a title."""
 
     case: Case
+    title: str
     trial: Trial
 
     @property
@@ -90,9 +94,9 @@ class TrialRow:
         return self.trial.dt if self.case.dt is not None else math.nan
 
     @property
-    def reason(self) -> str:
-        """Why it did not hold."""
-        return self.trial.run.reason
+    def shown(self) -> Shown:
+        """What it has shown."""
+        return self.trial.run.shown
 
 
 _METHOD: Final = (common.ENGINE, common.METHOD, common.SETTINGS)
@@ -107,9 +111,10 @@ ERROR: Final = common.ERROR_MAX.at(
     lambda row: row.run.error_max, "the largest error after so many steps as the study says"
 )
 STEP: Final = common.STEP_US.at(lambda row: row.timing.step_us)
+TITLE: Final = text_column("title", "title", "what a chain has to show: faithful, energy or moves well")
 LONGEST: Final = Column(
-    "longest_n", "1", "d", "longest chain", "the most links that run in real time with an energy error below 1 %",
-    is_time=True, empty="none",
+    "longest_n", "1", "d", "longest chain", "the most links with which the title is won in real time", is_time=True,
+    empty="none",
 )  # fmt: skip
 EXPONENT: Final = Column(
     "step_exponent", "1", ".2f", "exponent", "p in: cost of a step ~ n^p, by least squares on logarithms",
@@ -119,11 +124,34 @@ EXPONENT_ERROR: Final = Column(
     "step_exponent_error", "1", ".2f", "its error", "the standard error of that fit", lambda row: row.growth.error,
     is_time=True,
 )  # fmt: skip
-SPENT: Final = Column("race_spent_s", "s", ".3g", "spent, s", "time spent stepping", is_time=True)
-_OUTCOME: Final = text_column(
-    "outcome", "outcome", "held, lost (energy or rods), too slow for real time, or a status", is_time=True
+SPENT: Final = Column(
+    "race_spent_s", "s", ".3g", "spent, s", "processor time spent stepping", lambda row: row.shown.spent, is_time=True
 )
-_WORST: Final = replace(common.ENERGY_DRIFT_MAX, is_time=True)
+LOST: Final = Column(
+    "energy_lost", "energy scale", ".1e", "energy lost", "by how much the energy is less at the end than at the start",
+    lambda row: row.shown.lost, is_time=True,
+)  # fmt: skip
+_SHOWN: Final = (
+    replace(common.ENERGY_DRIFT_MAX.at(lambda row: row.shown.strays), is_time=True),
+    LOST,
+    Column(
+        "energy_risen", "energy scale", ".1e", "energy risen", "by how much it was at most above any value before",
+        lambda row: row.shown.risen, is_time=True,
+    ),
+    Column(
+        "predicted_error", "L", ".1e", "e, predictable", "the largest e(t) while the motion can be predicted; empty "
+        "where it was not compared", lambda row: row.shown.error, is_time=True,
+    ),
+    Column(
+        "coarse_error", "L", ".1e", "coarse error", "the largest error of the coarse motion in the first swing; empty "
+        "where it was not compared", lambda row: row.shown.coarse.worst, is_time=True,
+    ),
+)  # fmt: skip
+_OUTCOME: Final = text_column(
+    "outcome", "outcome",
+    "held, lost (what the title asks for), too slow for real time, not known (what it is compared with), or a status",
+    is_time=True,
+)  # fmt: skip
 
 _CASES: Final = (
     *common.CASE,
@@ -150,13 +178,14 @@ _LONGEST: Final = (
     common.METHOD,
     common.DT.at(lambda row: row.dt),
     common.SETTINGS,
+    TITLE,
     text_column("reason", "reason", "why the search ended", is_time=True),
-    _WORST.at(lambda row: row.run.energy_drift_max),
+    *_SHOWN,
     LONGEST,
     text_column("bound", "at least", "whether something else than the chain's length ended the search", is_time=True),
-    SPENT.at(lambda row: row.run.spent_s),
+    SPENT,
     Column("next_n", "1", "d", "next chain", "the shortest chain beyond the longest that was tried", is_time=True),
-    _OUTCOME.at(lambda row: row.beyond.outcome),
+    _OUTCOME,
 )
 _TRIALS: Final = (
     common.N.at(lambda row: row.trial.n),
@@ -164,14 +193,15 @@ _TRIALS: Final = (
     common.METHOD,
     common.DT.at(lambda row: row.dt),
     common.SETTINGS,
-    text_column("reason", "reason", "why it did not hold", is_time=True),
-    _WORST.at(lambda row: row.trial.run.energy_drift_max),
-    SPENT.at(lambda row: row.trial.run.spent_s),
+    TITLE,
+    text_column("reason", "reason", "why it did not hold", lambda row: row.trial.reason, is_time=True),
+    *_SHOWN,
+    SPENT,
     Column(
-        "reached_s", "s", ".3g", "reached, s", "how far the motion was followed", lambda row: row.trial.run.reached_s,
+        "reached_s", "s", ".3g", "reached, s", "how far the motion was followed", lambda row: row.shown.reached,
         is_time=True,
     ),
-    _OUTCOME.at(lambda row: row.trial.run.outcome),
+    _OUTCOME.at(lambda row: row.trial.outcome),
 )  # fmt: skip
 #: The columns of every table, by its name.
 COLUMNS: Final = {
@@ -190,8 +220,15 @@ def tables(results: Results[Found]) -> Sequence[Table]:
         {
             "cases": (CaseRow(case, cost) for racer in racers for case, cost in racer.costs.items()),
             "growth": (growth_row(racer, options.fit_from) for racer in racers),
-            "longest": (longest_row(racer, options) for racer in racers),
-            "trials": (TrialRow(racer.pattern, trial) for racer in racers for trial in racer.trials),
+            "longest": (
+                longest_row(racer.pattern, *each, options) for racer in racers for each in racer.trials.items()
+            ),
+            "trials": (
+                TrialRow(racer.pattern, title, trial)
+                for racer in racers
+                for title, trials in racer.trials.items()
+                for trial in trials
+            ),
         },
     )
 
@@ -215,20 +252,19 @@ def _fitted(measured: Mapping[int, float], fit_from: int) -> list[int]:
     return fitted if len(fitted) >= 3 else []
 
 
-def longest_row(racer: Racer, options: Options) -> LongestRow:
-    """The longest chain of a method that held, and what became of the next one."""
-    best, nearest = best_of(racer.trials), nearest_beyond(racer.trials)
-    dt = best.dt if best and racer.pattern.dt is not None else math.nan
-    run = best.run if best else RaceRun("")
-    beyond = nearest.run if nearest else RaceRun("")
-    stopped = beyond.outcome == "lost" and racer.pattern.dt is not None  # every finer step was tried
+def longest_row(case: Case, title: str, trials: Sequence[Trial], options: Options) -> LongestRow:
+    """The longest chain of a method that won a title, and what became of the next one."""
+    best, nearest = best_of(trials), nearest_beyond(trials)
+    outcome, reason = (nearest.outcome, nearest.reason) if nearest else ("", "")
+    stopped = outcome == "lost" and case.dt is not None  # every finer step was tried
     return LongestRow(
-        case=racer.pattern,
+        case=case,
+        title=title,
         longest_n=best.n if best else math.nan,
-        dt=dt,
-        run=run,
-        bound=best is not None and (stopped or beyond.outcome not in _TOO_LONG),
+        dt=best.dt if best and case.dt is not None else math.nan,
+        shown=best.run.shown if best else Shown(strays=math.nan, lost=math.nan, risen=math.nan, spent=math.nan),
+        bound=best is not None and (stopped or outcome not in _TOO_LONG),
         next_n=nearest.n if nearest else math.nan,
-        beyond=beyond,
-        reason=beyond.reason + (f"; no step below {options.finest:g} s is tried" if stopped else ""),
+        outcome=outcome,
+        reason=reason + (f"; no step below {options.finest:g} s is tried" if stopped else ""),
     )

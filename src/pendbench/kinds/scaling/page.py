@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Final
@@ -12,10 +12,12 @@ from pendbench.kinds.scaling.columns import (
     EXPONENT,
     EXPONENT_ERROR,
     LONGEST,
+    LOST,
     MEMORY,
     PER_LINK,
     SPENT,
     STEP,
+    TITLE,
     CaseRow,
     GrowthRow,
     LongestRow,
@@ -23,6 +25,7 @@ from pendbench.kinds.scaling.columns import (
 from pendbench.kinds.scaling.plots import cost_figure, longest_figure
 from pendbench.kinds.scaling.study import Found
 from pendbench.measures.orders import Growth
+from pendbench.measures.titles import TITLES, Title
 from pendbench.report.columns import DT, Column, Table, text_column
 from pendbench.report.names import engine_of, finite, grouped, is_ok, pair_of
 from pendbench.report.plots import Picture, draw
@@ -35,7 +38,7 @@ from pendbench.study.results import Results
 
 @dataclass(frozen=True)
 class Best:
-    """The longest chain of an engine, with its best method, and how that method's cost grows.
+    """The longest chain of an engine with a title, by its best method, and how that method's cost grows.
 
     noisy: how many of its timings are.
     """
@@ -48,9 +51,18 @@ class Best:
 
 
 @dataclass(frozen=True)
-class Facts:
-    """Everything that the template says. fitted: those of the best whose exponent is known."""
+class Won:
+    """A title, what it asks for, and the longest chain of each engine."""
 
+    title: Title
+    best: Sequence[Best]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Everything that the template says. fitted: methods of the best whose exponent is known, each once."""
+
+    won: Sequence[Won]
     best: Table
     fitted: Sequence[Best]
     noisy: int
@@ -63,11 +75,13 @@ class Facts:
 
 
 _BEST: Final = (
+    TITLE.at(lambda row: row.longest.title),
     text_column("method", "method", "engine and method", pair_of),
     LONGEST.at(lambda row: row.longest.longest_n),
     text_column("bound", "at least", "", lambda row: row.longest.bound),
     DT.at(lambda row: row.longest.dt),
-    SPENT.at(lambda row: row.longest.run.spent_s),
+    LOST.at(lambda row: row.longest.shown.lost),
+    SPENT.at(lambda row: row.longest.shown.spent),
     EXPONENT,
     EXPONENT_ERROR,
     Column("noisy", "1", "d", "noisy timings", ""),
@@ -78,12 +92,15 @@ _BEST: Final = (
 def facts(results: Results[Found], tables: dict[str, Table]) -> Facts:
     """What the page says."""
     del results
-    cases = list(tables["cases"])
-    best = Table("best", _BEST, list(_best(list(tables["longest"]), list(tables["growth"]), cases)))
+    cases, longest = list(tables["cases"]), grouped(tables["longest"], lambda row: str(row.title))
+    won = [Won(title, list(_best(longest[title.name], tables["growth"].rows, cases))) for title in _won(longest)]
+    best = Table("best", _BEST, [row for each in won for row in each.best])
+    methods = {pair_of(row): row for row in best}
     return Facts(
+        won=won,
         best=best,
-        fitted=[row for row in best if finite([row.growth.exponent])],
-        noisy=sum(row.noisy for row in best),
+        fitted=[row for row in methods.values() if finite([row.growth.exponent])],
+        noisy=sum(row.noisy for row in methods.values()),
         longest=tables["longest"],
         growth=tables["growth"],
         steps=_by_links(cases, STEP, "µs"),
@@ -91,6 +108,11 @@ def facts(results: Results[Found], tables: dict[str, Table]) -> Facts:
         errors=_by_links(cases, ERROR, "L"),
         memory=_by_links(cases, MEMORY, "MB"),
     )
+
+
+def _won(longest: Mapping[str, object]) -> list[Title]:
+    """The titles that the study asked for."""
+    return [title for title in TITLES if title.name in longest]
 
 
 def _best(longest: Sequence[LongestRow], growth: Sequence[GrowthRow], cases: Sequence[CaseRow]) -> Iterator[Best]:
@@ -117,7 +139,7 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
     del results
     held = [row for row in tables["longest"] if row.longest_n > 0]
     if held:
-        caption = "The longest chain that each engine and method runs in real time with an energy error below 1 %. "
+        caption = "The longest chain with which each engine and method wins each title in real time. "
         caption += "Hatched: at least as long."
         yield Picture("longest", "", caption, draw(partial(longest_figure, _styles(held), held)))
     timed = [row for row in tables["cases"] if row.timing.step_us > 0]

@@ -12,25 +12,35 @@ from pendbench.report.styles import Styles
 from pendbench.report.text import label
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 def longest_figure(styles: Styles, rows: Sequence[LongestRow]) -> Figure:
-    """A bar for each engine and method: the longest chain in real time. What is a lower bound is hatched."""
+    """A panel for each title, with a bar for each engine and method that won it: the longest chain. What is a lower
+    bound is hatched.
+    """
     from matplotlib.figure import Figure
 
-    known = sorted(rows, key=lambda row: row.longest_n)
-    figure = Figure(figsize=(7.5, 1.2 + 0.34 * len(known)), layout="constrained")
-    axes = figure.subplots()
-    for place, row in enumerate(known):
+    titles = grouped(rows, lambda row: row.title)
+    sizes = [1.0 + len(own) for own in titles.values()]
+    figure = Figure(figsize=(7.5, 1.2 + 0.3 * sum(sizes)), layout="constrained")
+    panels = figure.subplots(len(titles), 1, sharex=True, squeeze=False, height_ratios=sizes)[:, 0]
+    for axes, (title, own) in zip(panels, titles.items(), strict=True):
+        _bars(axes, styles, sorted(own, key=lambda row: row.longest_n))
+        axes.set_title(label(title), fontsize=10)
+        logarithmic(axes, 1.0, 10.0 * max(row.longest_n for row in rows), "x")
+    panels[-1].set_xlabel("links of the longest chain in real time")
+    return figure
+
+
+def _bars(axes: Axes, styles: Styles, rows: Sequence[LongestRow]) -> None:
+    for place, row in enumerate(rows):
         hatch = "//" if row.bound else None
         axes.barh(place, row.longest_n, color=styles.colour(row.case), height=0.7, hatch=hatch, edgecolor="white")
         told = f"{'at least ' if row.bound else ''}{LONGEST.text(row)}"
         axes.annotate(told, (row.longest_n, place), xytext=(4, 0), textcoords="offset points", va="center")
-    axes.set_yticks(range(len(known)), [label(pair_of(row)) for row in known])
-    logarithmic(axes, 1.0, 10.0 * max(row.longest_n for row in known), "x")
-    axes.set_xlabel("links of the longest chain in real time")
-    return figure
+    axes.set_yticks(range(len(rows)), [label(pair_of(row)) for row in rows])
 
 
 def cost_figure(styles: Styles, rows: Sequence[CaseRow]) -> Figure:

@@ -1,4 +1,4 @@
-"""Which chain to try next against the clock, and with which step."""
+"""Which chain to try next against the clock, and with which step: the same search for every title."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from pendbench.kinds.scaling.work import RaceRun
+from pendbench.measures.titles import Judged, Title
 from pendbench.scene.scene import MAX_LINKS
 
-#: Steps of the trials: each is so many times shorter than the one before.
+#: Steps of the trials: each is about so many times shorter than the one before.
 FINER: Final = 1.5
 #: How well the longest chain is known: to this factor.
 PRECISION: Final = 1.1
@@ -20,35 +21,52 @@ _FEWEST: Final = 8
 
 @dataclass(frozen=True)
 class Ladder:
-    """The steps of the trials, s. fixed: whether the method takes them at all, or chooses its own."""
+    """The steps of the trials, s: whole parts of the coarsest, so that chains are looked at at the same times.
+
+    fixed: whether the method takes them at all, or chooses its own.
+    """
 
     coarsest: float
     finest: float
     fixed: bool
 
     def rung_above(self, wanted: float) -> float:
-        """A step of the ladder that is a little coarser than the one wanted."""
-        rungs = max(0, math.ceil(math.log(self.coarsest / (wanted * FINER)) / math.log(FINER)))
-        return float(f"{self.coarsest / FINER**rungs:.6g}")
+        """The step of the ladder that is next coarser than the one wanted; the coarsest, if there is none."""
+        parts = 1
+        while self.coarsest / _finer(parts) > wanted:
+            parts = _finer(parts)
+        return self.coarsest / parts
 
     def finer(self, dt: float) -> float | None:
         """The next rung; None where there is none."""
-        finer = float(f"{dt / FINER:.6g}")
+        finer = self.coarsest / _finer(round(self.coarsest / dt))
         return finer if self.fixed and finer >= self.finest else None
+
+
+def _finer(parts: int) -> int:
+    return math.ceil(FINER * parts)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A chain of n links with a step dt (s), and how it fared."""
+    """A chain of n links with a step dt (s), and how it fared with a title."""
 
     n: int
     dt: float
     run: RaceRun
+    outcome: str
+    reason: str = ""
 
     @property
     def held(self) -> bool:
-        """Whether it kept up with the clock, and its energy."""
-        return self.run.outcome == "held"
+        """Whether it won the title."""
+        return self.outcome == "held"
+
+
+def trial_of(title: Title, n: int, dt: float, run: RaceRun) -> Trial:
+    """How a run fared with a title: where it came to no end, that is its status."""
+    judged = title.judge(run.shown) if run.status == "ok" else Judged(run.status, run.reason)
+    return Trial(n, dt, run, *judged)
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
@@ -68,7 +86,7 @@ def next_trial(trials: Sequence[Trial], ladder: Ladder) -> tuple[int, float] | N
     if not trials:
         return _FEWEST, ladder.rung_above(ladder.coarsest)
     last = trials[-1]
-    if last.run.outcome == "lost" and (finer := ladder.finer(last.dt)) is not None:
+    if last.outcome == "lost" and (finer := ladder.finer(last.dt)) is not None:
         return last.n, finer
     best = best_of(trials)
     if best is None:

@@ -2,7 +2,7 @@
 
 The study's scene is a pattern: its mass and its length are divided among any number of links. It measures the cost of a
 step for each number of links, from few to many until one takes too long; then it tries longer and longer chains against
-the clock, each with the coarsest step that keeps the energy.
+the clock, for each title with the coarsest step that wins it.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ from pendbench.base.errors import InputError
 from pendbench.base.ranges import Step
 from pendbench.base.strict import input_error
 from pendbench.execution.runner import Runner
-from pendbench.execution.tasks import task
-from pendbench.kinds.scaling.search import Ladder, Trial, next_trial
+from pendbench.execution.tasks import Task, task
+from pendbench.kinds.scaling.search import Ladder, Trial, next_trial, trial_of
 from pendbench.kinds.scaling.work import RaceRun, StepCost, measure_race, measure_step_cost
-from pendbench.measures.energy import is_driven
+from pendbench.measures.energy import conserves_energy, is_driven
+from pendbench.measures.known_motion import Known, measure_known
+from pendbench.measures.titles import TITLES, Title
 from pendbench.physics import dense
 from pendbench.scene.links import Links
 from pendbench.scene.scene import MAX_LINKS, Effects, Scene
@@ -32,6 +34,8 @@ from pendbench.study.plan import Plan
 from pendbench.study.study_file import StudyFile
 
 _LINKS: Final = (1, 2, 5, 10, 20, 50, 100, 200)
+_FRAME: Final = 1 / 240  # s
+_KNOWN_SHARE: Final = 3.0  # of the time limit: a motion is known once, and compared with many times
 _ALIKE: Final = ("masses", "lengths", "angles", "rates")
 
 
@@ -51,7 +55,7 @@ class Options(StudyFile):
     duration: Annotated[float, Field(gt=0, le=1000)] = 10.0
     """how long a chain has to keep up with the clock, s"""
     coarsest: Annotated[float, Step(1e-6, 1.0, "s")] = 1 / 240
-    """the coarsest step of the trials, s"""
+    """the coarsest step of the trials, s; all others are whole parts of it"""
     finest: Annotated[float, Step(1e-6, 1.0, "s")] = 1e-5
     """and the finest"""
 
@@ -59,16 +63,21 @@ class Options(StudyFile):
         """The steps of a case's trials."""
         return Ladder(self.coarsest, self.finest, fixed=case.dt is not None)
 
+    @property
+    def every(self) -> float:
+        """How often trials are looked at, s: at every coarsest step, or as many of them as a frame has."""
+        return self.coarsest * max(1, round(_FRAME / self.coarsest))
+
 
 @dataclass(frozen=True)
 class Racer:
     """What the study found of one engine and method. pattern: the case of the study. costs: by number of links, as far
-    as it got. cases: what was timed. trials: against the clock, in their order.
+    as it got. trials: against the clock, in their order, by title.
     """
 
     pattern: Case
     costs: Mapping[Case, StepCost]
-    trials: Sequence[Trial]
+    trials: Mapping[str, Sequence[Trial]]
 
 
 Found = tuple[Racer, ...]
@@ -108,10 +117,20 @@ def _rests(scene: Scene) -> bool:
 def measure(plan: Plan, runner: Runner) -> Found:
     """Run the study."""
     patterns = list({(case.engine, case.method, case.settings): case for case in plan.cases}.values())
-    compile_kernels(runner, (), patterns, truth=False)
+    compared = Case(patterns[0].scene, "analytic", "adaptive", None)  # computes most motions that are compared with
+    compile_kernels(runner, (), [*patterns, compared], truth=False)
     costs = _costs(patterns, plan.options, runner)
-    trials = _trials(patterns, plan.options, runner)
-    return tuple(Racer(pattern, costs[pattern], trials[pattern]) for pattern in patterns)
+    claims = [(pattern, title) for pattern in patterns for title in titles_of(pattern.scene)]
+    trials = _trials(claims, plan.options, runner)
+    return tuple(
+        Racer(pattern, costs[pattern], {title.name: its for (of, title), its in trials.items() if of is pattern})
+        for pattern in patterns
+    )
+
+
+def titles_of(scene: Scene) -> tuple[Title, ...]:
+    """The titles that chains like a scene can win: none may gain energy, which says nothing where something works."""
+    return tuple(title for title in TITLES if title.name != "moves well" or conserves_energy(scene))
 
 
 def chain_of(pattern: Scene, n: int, duration: float) -> Scene:
@@ -179,22 +198,63 @@ def _costs(patterns: Sequence[Case], options: Options, runner: Runner) -> dict[C
     return found
 
 
-def _trials(patterns: Sequence[Case], options: Options, runner: Runner) -> dict[Case, list[Trial]]:
-    """Longer and longer chains against the clock."""
-    found: dict[Case, list[Trial]] = {pattern: [] for pattern in patterns}
+Claim = tuple[Case, Title]
+Chain = tuple[Case, int, float]
+
+
+def _trials(claims: Sequence[Claim], options: Options, runner: Runner) -> dict[Claim, list[Trial]]:
+    """Longer and longer chains against the clock; one run counts for all titles that ask for it."""
+    found: dict[Claim, list[Trial]] = {claim: [] for claim in claims}
+    runs: dict[Chain, RaceRun] = {}
     number = 0
     while asked := _asked(found, options):
         number += 1
-        cases = {pattern: _with_links(pattern, n, dt, options) for pattern, (n, dt) in asked.items()}
-        refusals = refused(runner, list(cases.values()))
-        tasks = {pattern: task(measure_race, case) for pattern, case in cases.items() if case not in refusals}
-        runs = runner.run(f"real time, round {number}", tasks)
-        for pattern, (n, dt) in asked.items():
-            run = runs[pattern] if pattern in runs else RaceRun(*refusals[cases[pattern]])
-            found[pattern].append(Trial(n, dt, run))
+        runs |= _raced(_open(asked, runs), f"real time, round {number}", options, runner)
+        for (pattern, title), (n, dt) in asked.items():
+            found[pattern, title].append(trial_of(title, n, dt, runs[pattern, n, dt]))
     return found
 
 
-def _asked(found: Mapping[Case, Sequence[Trial]], options: Options) -> dict[Case, tuple[int, float]]:
-    wanted = {pattern: next_trial(trials, options.ladder(pattern)) for pattern, trials in found.items()}
-    return {pattern: trial for pattern, trial in wanted.items() if trial is not None}
+def _asked(found: Mapping[Claim, Sequence[Trial]], options: Options) -> dict[Claim, tuple[int, float]]:
+    wanted = {claim: next_trial(trials, options.ladder(claim[0])) for claim, trials in found.items()}
+    return {claim: trial for claim, trial in wanted.items() if trial is not None}
+
+
+def _open(asked: Mapping[Claim, tuple[int, float]], runs: Mapping[Chain, RaceRun]) -> dict[Chain, list[Title]]:
+    """What has to be run, and for which titles: a run may have ended before it could win what is asked now."""
+    needed: dict[Chain, list[Title]] = {}
+    for (pattern, title), (n, dt) in asked.items():
+        chain = pattern, n, dt
+        if chain not in runs or trial_of(title, n, dt, runs[chain]).outcome == "unfinished":
+            needed.setdefault(chain, []).append(title)
+    return needed
+
+
+def _raced(
+    needed: Mapping[Chain, Sequence[Title]], stage: str, options: Options, runner: Runner
+) -> dict[Chain, RaceRun]:
+    """Run chains against the clock."""
+    cases = {chain: _with_links(*chain, options) for chain in needed}
+    refusals = refused(runner, list(cases.values()))
+    going = {chain: case for chain, case in cases.items() if case not in refusals}
+    known = _known([going[chain].scene for chain in going if _compares(needed[chain])], options.every, runner)
+    tasks = {
+        chain: task(
+            measure_race, case, options.every, tuple(title.name for title in needed[chain]),
+            needs=(known[case.scene.n],) if _compares(needed[chain]) else (),
+        )
+        for chain, case in going.items()
+    }  # fmt: skip
+    found = runner.run(stage, tasks)
+    return {chain: found[chain] if chain in found else RaceRun(*refusals[case]) for chain, case in cases.items()}
+
+
+def _compares(titles: Sequence[Title]) -> bool:
+    return any(title.compared for title in titles)
+
+
+def _known(scenes: Sequence[Scene], every: float, runner: Runner) -> dict[int, Task[Known]]:
+    """The motions of chains, by their number of links, made before they are needed."""
+    tasks = {scene.n: task(measure_known, scene, every, share=_KNOWN_SHARE) for scene in scenes}
+    runner.run("motions to compare with", tasks)
+    return tasks
