@@ -10,6 +10,7 @@ import pytest
 
 import pendbench as pb
 from pendbench.__main__ import main
+from pendbench.commands import takes
 from pendbench.commands.butterfly import butterfly
 from pendbench.commands.staging import stage_of
 from pendbench.commands.takes import LEFT, case_of, default_cases, takes_of
@@ -241,6 +242,31 @@ def test_a_long_chain_has_methods_that_are_done_in_time():
         case.engine for case in default_cases(pb.Scene.chain(n=1001, length=1.0, mass=1.0, angles=1.0, gravity=9.81))
     }
     assert default_cases(pb.load_scene("double"))[0].method == "adaptive"
+
+
+def test_a_very_long_chain_moves_well_and_has_no_truth():
+    """None is computed, which would take hours, and the page says so; moments and points are few."""
+    scene = pb.load_scene("rope60000").with_(duration=1.2)
+    assert [(case.engine, case.method, case.dt) for case in default_cases(scene)] == [("analytic", "bdf2", 1 / 480)]
+    assert next(case.method for case in default_cases(pb.load_scene("rope1000"))) == "frame"
+    short = pb.load_scene("rope1001").with_(duration=0.05)
+    stage = stage_of(short, takes_of(default_cases(short)))
+    assert stage.truth is None
+    assert "of more than 1000 links it takes hours; --whole-truth computes it" in stage.error_says
+    assert stage.acts[0].bodies[0].places.shape == (25, 160, 2)
+    assert np.isnan(stage.acts[0].leaves)
+    assert "is not compared with the truth" in stage.words[-1]
+
+
+def test_of_a_very_long_chain_no_more_moments_are_kept_than_are_drawn(monkeypatch):
+    """24 steps of 1001 links: every third of them, and the last."""
+    monkeypatch.setattr(takes, "_MOST_ANGLES", 8 * 1001)
+    short = pb.load_scene("rope1001").with_(duration=0.05)
+    [take] = takes_of(default_cases(short))
+    assert take.run.t == pytest.approx(np.arange(0, 25, 3) / 480)
+    monkeypatch.setattr(takes, "_MOST_ANGLES", 5 * 1001)
+    [take] = takes_of(default_cases(short))
+    assert take.run.t == pytest.approx(np.array([0, 5, 10, 15, 20, 24]) / 480)
 
 
 def test_nothing_to_show_is_one_line():

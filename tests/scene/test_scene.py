@@ -329,6 +329,21 @@ def test_the_bundled_scenes_are_chains_of_one_metre_and_one_kilogram() -> None:
         assert (bundled("models") / f"{name}.toml").read_text().startswith("# ")
 
 
+def test_a_rope_of_any_number_of_links_has_a_name() -> None:
+    found, bundled_one = load_scene("rope250"), load_scene("rope200")
+    assert (found.n, found.name, found.duration) == (250, "rope250", 2.0)
+    assert found.effects == bundled_one.effects
+    for name in ("masses", "lengths"):
+        assert math.isclose(getattr(found, name).sum(), getattr(bundled_one, name).sum(), rel_tol=1e-13)
+    assert (found.angles == bundled_one.angles[0]).all()
+    assert load_scene("rope1000").duration == 1.0  # the bundled one
+
+
+@pytest.mark.parametrize("name", ["rope0", "rope01", "rope1000001", "rope12.5", "rope", "rope-3", "Rope12", "rope1 "])
+def test_what_is_no_rope_is_an_unknown_scene(name: str) -> None:
+    assert "ropeN for any N" in complaint(load_scene, name)
+
+
 def test_an_unknown_name_lists_the_bundled_ones() -> None:
     message = complaint(load_scene, "dubble")
     assert message.startswith("unknown scene 'dubble'; did you mean 'double'? allowed: a01, ")

@@ -13,7 +13,7 @@ import numpy as np
 from pendbench.base.arrays import FloatArray
 from pendbench.base.errors import InputError, MissingEngineError, printable
 from pendbench.base.faults import Fault
-from pendbench.engines.protocol import Engine, Method
+from pendbench.engines.protocol import Engine, Method, refusal
 from pendbench.engines.recording import simulate
 from pendbench.engines.registry import engine, engine_names, only_by_name
 from pendbench.measures.divergence import time_to
@@ -40,8 +40,14 @@ _FEWEST_STEPS: Final = 1000
 LONG: Final = 100
 _FOR_LONG: Final = {"analytic": "frame"}
 _STEP_FOR_LONG_S: Final = 1 / 240
+#: A chain of more links is very long: no step is short enough for all of its motion, and nobody's truth reaches it.
+VERY_LONG: Final = 1000
+_FOR_VERY_LONG: Final = {"analytic": "bdf2"}  # moves well with half of a game's step: the study `scaling`
+_STEP_FOR_VERY_LONG_S: Final = 1 / 480
 #: The longest chain that an engine is asked for by default, where a longer one takes minutes or gigabytes.
-_LONGEST: Final = {"heyoka": LONG, "mujoco": 1000}
+_LONGEST: Final = {"heyoka": LONG, "mujoco": VERY_LONG, "pymunk": VERY_LONG}
+#: How many angles a run of a page keeps at most: those that are drawn need no more moments.
+_MOST_ANGLES: Final = 10_000_000
 #: What the truth of a page may cost, in steps times links: some seconds of work.
 TRUTH_WORK: Final = 6e4
 
@@ -62,14 +68,20 @@ def default_cases(scene: Scene) -> list[Case]:
     there = [name for name in engine_names() if not only_by_name(name) and _is_there(name)]
     if scene.n <= LONG:
         return [case_of(scene, name) for name in there]
-    able = [name for name in there if scene.n <= _LONGEST.get(name, scene.n)]
-    return [_long_case(scene, name) for name in able]
+    able = [_long_case(scene, name) for name in there if scene.n <= _LONGEST.get(name, scene.n)]
+    return [case for case in able if scene.n <= VERY_LONG or _takes(case)]
+
+
+def _takes(case: Case) -> bool:
+    """Whether its engine does not refuse the scene."""
+    return refusal(engine(case.engine), case.method, case.scene) is None
 
 
 def _long_case(scene: Scene, name: str) -> Case:
-    its = engine(name)
-    method = _FOR_LONG.get(name, next(iter(its.methods)))
-    return case_of(scene, name, method, None if its.methods[method].adaptive else _STEP_FOR_LONG_S)
+    its, very = engine(name), scene.n > VERY_LONG
+    methods, step = (_FOR_VERY_LONG, _STEP_FOR_VERY_LONG_S) if very else (_FOR_LONG, _STEP_FOR_LONG_S)
+    method = methods.get(name, next(iter(its.methods)))
+    return case_of(scene, name, method, None if its.methods[method].adaptive else step)
 
 
 def _is_there(name: str) -> bool:
@@ -102,13 +114,29 @@ def takes_of(cases: Sequence[Case]) -> list[Take]:
 
 
 def _run(case: Case, times: FloatArray | None) -> Trajectory:
+    times = _kept(case) if times is None else times
     found = simulate(case.scene, case.engine, case.method, case.dt, times, **dict(case.settings))
     with np.errstate(all="ignore"):
         return with_energy_checked(found, energy_balance(case.scene, found))
 
 
+def _kept(case: Case) -> FloatArray | None:
+    """When a run of a very long chain is kept, s; None for what `simulate` keeps of others."""
+    scene, dt = case.scene, case.dt
+    if scene.n <= VERY_LONG or dt is None:
+        return None
+    total = math.floor(scene.duration / dt * (1 + 1e-9))
+    stride = max(1, -(-total * scene.n // _MOST_ANGLES))
+    return np.asarray(np.unique(np.append(np.arange(0, total, stride), total)) * dt, np.float64)
+
+
 def truth_of(scene: Scene, runs: Iterable[Trajectory], most_work: float = TRUTH_WORK) -> KeptTruth:
-    """The truth at all the times of the runs, as far as so much work gets; `reference_within` says what work is."""
+    """The truth at all the times of the runs, as far as so much work gets; `reference_within` says what work is.
+
+    Of a very long chain there is none, unless as much work is asked for as it takes.
+    """
+    if scene.n > VERY_LONG and math.isfinite(most_work):
+        return KeptTruth("refused", f"of more than {VERY_LONG} links it takes hours; --whole-truth computes it")
     times = reduce(np.union1d, [run.t for run in runs], np.zeros(1))
     return measure_truth(scene, np.asarray(times, np.float64), most_work)
 

@@ -247,7 +247,8 @@ def load_scene(path_or_name: str | os.PathLike[str], *, relative_to: Path | None
 
     A file is TOML, or a model of a planar chain in MJCF (.xml) or URDF (.urdf): docs/models.md. What ends in one of
     these or holds a path separator is a path; it is looked for in the folder `relative_to` first, where
-    one is given, and then in the working folder. Anything else is the name of a bundled scene.
+    one is given, and then in the working folder. Anything else is the name of a bundled scene, or `ropeN`, which is a
+    rope of a metre in N links.
 
     >>> import pendbench as pb
     >>> pb.load_scene("damped_double")
@@ -255,9 +256,11 @@ def load_scene(path_or_name: str | os.PathLike[str], *, relative_to: Path | None
 
     Raises `InputError`, one line naming the file and the key, for whatever cannot be used.
     """
+    from pendbench.scene.ropes import rope_named
     from pendbench.scene.toml_file import find_scene, read_scene  # loads pydantic, which importing a scene should not
 
-    return read_scene(find_scene(path_or_name, relative_to))
+    rope = rope_named(path_or_name)
+    return read_scene(find_scene(path_or_name, relative_to)) if rope is None else rope
 
 
 def scene_of(scene: Scene | str | os.PathLike[str]) -> Scene:

@@ -162,7 +162,7 @@ def find_scene(path_or_name: str | os.PathLike[str], relative_to: Path | None = 
     if not (text.lower().endswith((".toml", *MODEL_FILES)) or "/" in text or os.sep in text):
         if text not in bundled_names("models"):
             unknown = choose("scene", printable(text[:60]), bundled_names("models"))
-            raise InputError(f"{unknown}, or a path that ends in .toml, .xml or .urdf")
+            raise InputError(f"{unknown}, ropeN for any N, or a path that ends in .toml, .xml or .urdf")
         return bundled("models") / f"{text}.toml"
     if relative_to is None or os.path.isabs(text):
         return Path(text)
