@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendbench.engines.conformance import CHECKS, findings_of
+from pendbench.engines.conformance import CHECKS, findings_of, model
+from pendbench.engines.conformance.chains import calm
 from pendbench.engines.conformance.check import FAILED, SKIPPED, Subject, findings
 from support.zoo import ZOO, Beast, Rules, heavy, knowing
 
@@ -59,6 +60,31 @@ def test_limits_are_numbers_and_say_where_they_are_from():
         assert check.asks.endswith("?")
         assert check.unit
         assert check.limit_from
+
+
+@pytest.mark.parametrize(
+    ("off", "tried", "right"),
+    [
+        (lambda _: 1e-7, 1, True),  # at once
+        (lambda times: 0.1 / times**3, 6, True),  # 3e-6 with 32 times the steps
+        (lambda times: 0.1 * 0.5 ** ((times - 1) / 3), 6, True),  # 8e-5, and its limit is 0
+        (lambda _: 0.1, 3, False),  # another system: no number of steps will help
+        (lambda times: 0.1 * 0.985 ** ((times - 1) / 3), 3, False),  # nor here: 0.086
+    ],
+)
+def test_a_solver_that_settles_is_waited_for_and_another_system_is_not(monkeypatch, off, tried, right):
+    scene, asked = calm(), []
+    exact = model.accelerations(scene, scene.angles, scene.rates)
+
+    def accelerations(its, scene, steps):  # noqa: ARG001
+        asked.append(steps // 64)
+        now = off(asked[-1])
+        return model._Measured(exact + now * np.abs(exact).max(), now, 1e-5)
+
+    monkeypatch.setattr(model, "_accelerations", accelerations)
+    found = model._settled(None, scene, 64)
+    assert asked == [1, 2, 4, 8, 16, 32][:tried]
+    assert (found.off <= found.limit) == right
 
 
 def rounded(run):

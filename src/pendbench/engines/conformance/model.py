@@ -27,6 +27,8 @@ _SIZE: Final = "of the largest acceleration"
 _SETTLED: Final = 128
 _STEPS: Final = 64
 _FALLEN: Final = 0.75  # of what it was: it falls
+# What settles exponentially and has this left with four times the steps has more than `_FALLEN` left with 32 times.
+_STANDS: Final = 0.98
 # Of methods with a plateau: two numbers of fine steps a second, and how far off they may be in other chains than the
 # calm one, whose plateau it is.
 _FINE: Final = (2048, 4096)
@@ -103,7 +105,8 @@ def _settled(its: Subject, scene: Scene, steps: int) -> _Measured:
     """The accelerations of a solver that may want more steps to settle: those of the fewest that will do.
 
     What falls with the number of steps in a span is no other system, but a solver on its way; where it is a long way,
-    the limit is taken. More steps have more rounding, which excuses nothing that does not fall.
+    the limit is taken, and what does not fall at all is not waited for. More steps have more rounding, which excuses
+    nothing that does not fall.
     """
     first = before = last = _accelerations(its, scene, steps)
     if first.off <= first.limit:
@@ -112,6 +115,8 @@ def _settled(its: Subject, scene: Scene, steps: int) -> _Measured:
         before, last = last, _accelerations(its, scene, times * steps)
         if last.off <= min(last.limit, _FALLEN * first.off):
             return last
+        if times == 4 and not last.off < _STANDS * first.off:
+            return first
     if not last.off < _FALLEN * before.off:
         return first
     found = 2.0 * last.found - before.found
