@@ -62,13 +62,15 @@ class Judged(NamedTuple):
 class Title:
     """asks: for what, in a sentence. fails: why a run that has shown so much cannot win it; empty while it can.
 
-    compared: the error that it asks for; None where nothing has to be known of the motion.
+    compared: the error that it asks for; None where nothing has to be known of the motion. afar: whether what it asks
+    for can be had with the same step in longer chains; else steps shrink as links do.
     """
 
     name: str
     asks: str
     fails: Callable[[Shown], str]
     compared: Callable[[Shown], float] | None = None
+    afar: bool = False
 
     def judge(self, shown: Shown) -> Judged:
         """What a run has won by what it has shown."""
@@ -115,6 +117,7 @@ TITLES: Final = (
         "an energy that never rises by 1 %, and the coarse motion of the first swing within 2 % of the length",
         _moves_badly,
         lambda shown: shown.coarse.worst,
+        afar=True,
     ),
 )
 

@@ -23,12 +23,18 @@ _FEWEST: Final = 8
 class Ladder:
     """The steps of the trials, s: whole parts of the coarsest, so that chains are looked at at the same times.
 
-    fixed: whether the method takes them at all, or chooses its own.
+    fixed: whether the method takes them at all, or chooses its own. shrinks: whether a longer chain begins with a step
+    that is as much shorter.
     """
 
     coarsest: float
     finest: float
     fixed: bool
+    shrinks: bool = True
+
+    def first(self, best: Trial, n: int) -> float:
+        """The step with which to begin with a chain of n links, after a shorter one that held."""
+        return self.rung_above(best.dt * best.n / n) if self.shrinks else self.coarsest
 
     def rung_above(self, wanted: float) -> float:
         """The step of the ladder that is next coarser than the one wanted; the coarsest, if there is none."""
@@ -92,7 +98,7 @@ def next_trial(trials: Sequence[Trial], ladder: Ladder) -> tuple[int, float] | N
     if best is None:
         return (last.n // 2, ladder.rung_above(ladder.coarsest)) if last.n > 1 else None
     n = _next_length(trials, best.n)
-    return None if n is None else (n, ladder.rung_above(best.dt * best.n / n))  # steps fall like 1/n
+    return None if n is None else (n, ladder.first(best, n))
 
 
 def _next_length(trials: Sequence[Trial], longest: int) -> int | None:

@@ -18,11 +18,11 @@ from pendbench.base.errors import InputError
 from pendbench.base.ranges import Step
 from pendbench.base.strict import input_error
 from pendbench.execution.runner import Runner
-from pendbench.execution.tasks import Task, task
+from pendbench.execution.tasks import task
 from pendbench.kinds.scaling.search import Ladder, Trial, next_trial, trial_of
 from pendbench.kinds.scaling.work import RaceRun, StepCost, measure_race, measure_step_cost
 from pendbench.measures.energy import conserves_energy, is_driven
-from pendbench.measures.known_motion import Known, measure_known
+from pendbench.measures.known_motion import measure_known
 from pendbench.measures.titles import TITLES, Title
 from pendbench.physics import dense
 from pendbench.scene.links import Links
@@ -59,9 +59,9 @@ class Options(StudyFile):
     finest: Annotated[float, Step(1e-6, 1.0, "s")] = 1e-5
     """and the finest"""
 
-    def ladder(self, case: Case) -> Ladder:
-        """The steps of a case's trials."""
-        return Ladder(self.coarsest, self.finest, fixed=case.dt is not None)
+    def ladder(self, case: Case, title: Title) -> Ladder:
+        """The steps of a case's trials for a title."""
+        return Ladder(self.coarsest, self.finest, fixed=case.dt is not None, shrinks=not title.afar)
 
     @property
     def every(self) -> float:
@@ -216,7 +216,7 @@ def _trials(claims: Sequence[Claim], options: Options, runner: Runner) -> dict[C
 
 
 def _asked(found: Mapping[Claim, Sequence[Trial]], options: Options) -> dict[Claim, tuple[int, float]]:
-    wanted = {claim: next_trial(trials, options.ladder(claim[0])) for claim, trials in found.items()}
+    wanted = {claim: next_trial(trials, options.ladder(*claim)) for claim, trials in found.items()}
     return {claim: trial for claim, trial in wanted.items() if trial is not None}
 
 
@@ -237,24 +237,15 @@ def _raced(
     cases = {chain: _with_links(*chain, options) for chain in needed}
     refusals = refused(runner, list(cases.values()))
     going = {chain: case for chain, case in cases.items() if case not in refusals}
-    known = _known([going[chain].scene for chain in going if _compares(needed[chain])], options.every, runner)
+    known = {
+        case.scene.n: task(measure_known, case.scene, options.every, share=_KNOWN_SHARE) for case in going.values()
+    }
+    runner.run("motions to compare with", known)
     tasks = {
         chain: task(
-            measure_race, case, options.every, tuple(title.name for title in needed[chain]),
-            needs=(known[case.scene.n],) if _compares(needed[chain]) else (),
+            measure_race, case, options.every, tuple(title.name for title in needed[chain]), needs=(known[chain[1]],)
         )
         for chain, case in going.items()
-    }  # fmt: skip
+    }
     found = runner.run(stage, tasks)
     return {chain: found[chain] if chain in found else RaceRun(*refusals[case]) for chain, case in cases.items()}
-
-
-def _compares(titles: Sequence[Title]) -> bool:
-    return any(title.compared for title in titles)
-
-
-def _known(scenes: Sequence[Scene], every: float, runner: Runner) -> dict[int, Task[Known]]:
-    """The motions of chains, by their number of links, made before they are needed."""
-    tasks = {scene.n: task(measure_known, scene, every, share=_KNOWN_SHARE) for scene in scenes}
-    runner.run("motions to compare with", tasks)
-    return tasks
