@@ -91,8 +91,8 @@ def test_a_run_that_drag_blows_up_is_a_fault_and_no_warning(name: str, method: s
 @pytest.mark.parametrize(("name", "method"), FIXED)
 @pytest.mark.parametrize("rods", [[0.5, 0.4, 0.3], [0.0, 0.4, 0.3]], ids=["all rods", "one without"])
 def test_masses_of_0_are_simulated_or_refused(name: str, method: str, rods: list[float]) -> None:
-    """A rod alone, one with a point at its end, and one that has neither or is heavy."""
-    effects = Effects(gravity=GRAVITY, rod_mass=rods, driven_pivot=USUAL["driven_pivot"])
+    """A rod alone, one with a point at its end, and one that has neither or is heavy; under all effects."""
+    effects = Effects(**{**USUAL, "rod_mass": rods}).only(*SETS["all"])
     scene = Scene("rods", "", 1.0, [0.2, 0.0, 0.0], [0.5, 0.4, 0.3], [0.8, 0.6, 0.9], [0.5, 1.0, 0.0], effects)
     its = loaded(name)
     if refused := refusal(its, method, scene):
