@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numba
 import numpy as np
 import pytest
 
 import pendbench as pb
 from pendbench.engines.analytic.adapter import AnalyticEngine
+from pendbench.engines.analytic.runs import _unforced
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance
+from pendbench.physics.kernels.table import system_of
 from pendbench.scene.scene import Effects, Scene
+from support.effect_sets import SETS, under
 from support.scenes import chain, random_chain
 from support.systems import order
 
@@ -145,6 +149,13 @@ def test_states_are_copies():
         run.advance(5) if dt else run.advance_to(0.05)
         np.testing.assert_array_equal(before.theta, kept)
         assert np.abs(run.state().theta - kept).max() > 0
+
+
+def test_momenta_and_rates_share_kernels_whatever_acts():
+    """Those of a chain of masses, of one with links, and of one with rotors."""
+    made = [_unforced(system_of(under(names, random_chain(3, seed=3)))) for names in SETS.values()]
+    assert len({numba.typeof(system) for system in made}) == 3
+    assert len(SETS) > 6
 
 
 def test_fixed_step_without_a_step_is_an_error():

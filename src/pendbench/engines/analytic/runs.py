@@ -12,6 +12,7 @@ from pendbench.base.faults import Fault
 from pendbench.engines.protocol import State
 from pendbench.physics.acting import check_plain
 from pendbench.physics.geometry import positions, velocities
+from pendbench.physics.kernels.system import RotorSystem
 from pendbench.physics.kernels.table import momenta_of, rates_of, series_system_of, system_of
 from pendbench.scene.scene import Scene
 from pendbench.solvers import adaptive, control, outcome, taylor
@@ -45,18 +46,25 @@ class _Rates:
         return State(self.state.q.copy(), self.state.v.copy())
 
 
+def _unforced(system: Any) -> Any:
+    """The same chain, and nothing that acts on it: momenta and rates know only that, so all effects share kernels."""
+    if isinstance(system, RotorSystem):
+        return RotorSystem(_unforced(system.chain), system.rotors)
+    return system._replace(pivots=(), joints=(), drags=())
+
+
 class _Momenta:
     """Angles and momenta."""
 
     def __init__(self, scene: Scene, method: FixedStep) -> None:
         self.system, momenta = system_of(scene), np.empty(scene.n)
-        self._rates = scene.rates.copy()
-        momenta_of(self.system, scene.angles.copy(), self._rates, momenta)
+        self._bare, self._rates = _unforced(self.system), scene.rates.copy()
+        momenta_of(self._bare, scene.angles.copy(), self._rates, momenta)
         self.state = method.begin(scene.angles, momenta, scene.rates)
 
     def now(self, taken: int) -> State:
         if taken:
-            rates_of(self.system, self.state.q, self.state.p, self._rates)
+            rates_of(self._bare, self.state.q, self.state.p, self._rates)
         return State(self.state.q.copy(), self._rates.copy())
 
 
