@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -107,3 +110,27 @@ def test_a_python_without_pendbench_is_one_line(tmp_path):
     script.chmod(0o755)
     with pytest.raises(InputError, match="pendbench; allowed: one with pendbench"):
         use([f"pymunk={script}"], engine_names())
+
+
+_BUSY = "import time\nfrom pendbench.engines import elsewhere_child\nelsewhere_child.serve=lambda *_: time.sleep(600)\n"
+
+
+def test_a_process_that_is_busy_ends_with_whoever_asked_it():
+    child = f"{_BUSY}elsewhere_child.main()"
+    asks = (
+        f"import os,subprocess,sys\nprint(subprocess.Popen([sys.executable,'-c',{child!r},'scipy',str(os.getpid())],"
+        "stdin=subprocess.PIPE,stdout=subprocess.DEVNULL).pid)"
+    )
+    told = subprocess.run([sys.executable, "-c", asks], stdout=subprocess.PIPE, check=True)
+    pid, patience = int(told.stdout), time.monotonic() + 120.0
+    while _runs(pid) and time.monotonic() < patience:
+        time.sleep(0.1)
+    assert not _runs(pid)
+
+
+def _runs(pid: int) -> bool:
+    """Whether a process has not ended; one whose end nobody has asked for yet has."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

@@ -12,6 +12,7 @@ import os
 import pickle
 import signal
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
@@ -85,7 +86,7 @@ class _Process:
         if self._child is None or self._child.poll() is not None:
             self.close()
             own = {key: value for key, value in os.environ.items() if key != PYTHONS}
-            command = [self._path, "-m", _CHILD, self._name]
+            command = [self._path, "-m", _CHILD, self._name, str(os.getpid())]
             self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=own)
         try:
             pickle.dump((verb, arguments, _time_left()), self._child.stdin)
@@ -111,7 +112,8 @@ class _Process:
                     stream.close()
 
     def __del__(self) -> None:
-        self.close()
+        if not sys.is_finalizing():  # at the end of this process the other ends by itself
+            self.close()
 
     def _ending(self) -> str:
         code = self._child.wait()

@@ -1,7 +1,7 @@
 """The other side of `engines.elsewhere`: serves one engine of this environment to the process that started it.
 
-``python -m pendbench.engines.elsewhere_child ENGINE`` reads messages from its input and answers on its output, until
-its input ends. Whatever the engine prints goes elsewhere.
+``python -m pendbench.engines.elsewhere_child ENGINE PARENT`` reads messages from its input and answers on its output,
+until its input or the process PARENT ends. Whatever the engine prints goes elsewhere.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import os
 import pickle
 import signal
 import sys
+import threading
 from typing import Any, BinaryIO
 
 from pendbench.base.errors import InputError, describe
@@ -91,8 +92,17 @@ def serve(name: str, asked: BinaryIO, told: BinaryIO) -> None:
         told.flush()
 
 
+def _end_with(parent: int) -> None:
+    """End when whoever started this process has ended, also in the middle of an answer that takes long."""
+    waiting = threading.Event()
+    while os.getppid() == parent:
+        waiting.wait(1.0)
+    os._exit(0)
+
+
 def main() -> None:
     """Serve the engine that is named."""
+    threading.Thread(target=_end_with, args=(int(sys.argv[2]),), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever asks decides when it is over
     told = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
