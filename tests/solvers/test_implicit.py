@@ -14,6 +14,7 @@ from pendbench.physics.geometry import positions, velocities
 from pendbench.scene.scene import Scene
 from pendbench.solvers import closing, implicit
 from pendbench.solvers.methods import fixed_step_methods
+from pendbench.solvers.rods import rub
 from support.scenes import chain, random_chain
 
 METHODS = ["implicit_euler", "bdf2", "energy_momentum"]
@@ -214,10 +215,45 @@ def test_angles_follow_turns(method: str) -> None:
         assert turns[-1] > 2.0
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_start_that_no_angles_close_is_a_status(method: str) -> None:
+def test_rubbing_evens_out_speeds_and_gives_no_energy() -> None:
+    """(1 + mass A) v = v_0, by a dense solver; masses lose energy, and no mass is faster than the fastest was."""
+    scene = random_chain(6, seed=11)
+    its = Rods(scene, "bdf2")
+    assert its.steps(0.01, 5) == 5
+    relative, before, rubbed = its.state.memory[2:4].T.copy(), its.speeds, 0.3
+    inverse = np.append(0.0, 1.0 / scene.masses)
+    couplings = np.diag(inverse[:-1] + inverse[1:]) - np.diag(inverse[1:-1], 1) - np.diag(inverse[1:-1], -1)
+    rub(its.chain, its.state, rubbed)
+    solved = np.linalg.solve(np.eye(6) + rubbed * couplings, relative)
+    np.testing.assert_allclose(its.state.memory[2:4].T, solved, rtol=1e-12)
+    assert scene.masses @ (its.speeds**2).sum(axis=1) < scene.masses @ (before**2).sum(axis=1)
+    assert np.abs(its.speeds).max() <= np.abs(before).max()
+
+
+@pytest.mark.parametrize("method", DAMPED)
+def test_links_that_whirl_faster_than_any_step_follows_are_passed(method: str) -> None:
+    """Neighbours that turn against each other by a million turns a step: no part of it closes before they rub off."""
+    scene = dataclasses.replace(rope(10), rates=1e9 * (-1.0) ** np.arange(10))
+    run = AnalyticEngine().build(scene, method, FRAME)
+    run.advance(24)
+    assert run.health() is None
+    state = run.state()
+    assert energy(scene, state.theta, state.omega) < energy(scene, scene.angles, scene.rates)
+
+
+@pytest.mark.parametrize("method", DAMPED)
+def test_what_nothing_closes_is_left_where_it_was(method: str) -> None:
+    """Squares of these rates are beyond what a number can be."""
+    its = Rods(rope(10), method)
+    its.state.v[:] = 1e200
+    with np.errstate(all="ignore"):
+        assert its.steps(1.0, 3) == 0
+    np.testing.assert_array_equal(its.state.q, its.scene.angles)
+
+
+def test_a_start_that_no_angles_close_is_a_status() -> None:
     scene = dataclasses.replace(rope(10), rates=np.linspace(-1e9, 1e9, 10))
-    run = AnalyticEngine().build(scene, method, 1.0)
+    run = AnalyticEngine().build(scene, "energy_momentum", 1.0)
     run.advance(3)
     status, reason = run.health()
     assert status == "not converged"

@@ -32,7 +32,7 @@ from pendbench.solvers.trigonometry import write_directions
 _MOST_ITERATIONS = 12
 #: A change of angle, rad, that no iteration recovers from; and one so small that, where it no longer falls, digits end.
 _LOST, _ROUNDING = 30.0, 1e-7
-_TURN = 2.0 * np.pi
+TURN = 2.0 * np.pi
 
 # The rows of `Room.rows`: see there.
 WANTED_X, WANTED_Y, ANGLE, PULL, ROD_Y, ROD_X, ALONG_Y, ALONG_X, FORCE_X, FORCE_Y, SPARE, GUESS = range(12)
@@ -183,6 +183,6 @@ def close(chain: Chain, room: Room, angles: FloatArray, share: float, tolerance:
     else:
         return False
     for i in range(n):
-        rows[ANGLE, i] -= _TURN * np.round((rows[ANGLE, i] - rows[GUESS, i]) / _TURN)
+        rows[ANGLE, i] -= TURN * np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
     write_rods(rows[ANGLE, :n], rows, ROD_Y)
     return True

@@ -5,33 +5,39 @@ angles and pulls that close the chain (`closing`):
 
 - `implicit_euler`, order 1: v' = (r' - r)/h, a' = (v' - v)/h. The floor: it damps whatever moves.
 - `bdf2`, order 2: both derivatives by the formula over the last two steps, of any ratio. It damps what is too fast for
-  the step and nearly nothing else. A step that has no solution, as where a whip cracks, is taken with order 1.
+  the step and nearly nothing else. Where a step has no solution, as where a whip cracks, some are taken with order 1.
 - `energy_momentum`, order 2: the mean of the velocities carries the rods, and rods pull along the mean of old and new.
   Then pulls do no work on rods that keep their lengths, and gravity exactly its own: the energy of the velocities in
   the plane is that at the start, to what Newton's method leaves.
 
 A step that does not close is cut in two, and so is one of `bdf2` that misses what the motion before suggests by more
-than `FAR_OFF` of the chain; after one that does, twice the step is tried. Velocities of rods between two steps have a
-part along them, of the size of the method's error; rates are those of the nearest motion, in the masses' metric, that
-keeps the rods' lengths.
+than `FAR_OFF` of the chain; after one that does, twice the step is tried. Where even the finest part does not close,
+neighbours rub off on each other until it does. Velocities of rods between two steps have a part along them, of the size
+of the method's error; rates are those of the nearest motion, in the masses' metric, that keeps the rods' lengths.
 
 Sources: Hairer, Wanner, Solving Ordinary Differential Equations II, VII.3 (BDF for constrained systems); Hairer,
 Norsett, Wanner I, III.5 (variable steps); Gonzalez, J. Nonlinear Sci. 6 (1996), 449, and Betsch and Steinmann, Int. J.
-Numer. Meth. Engng 53 (2002), 2271 (energy and momentum of constrained systems). equations.md, (E58) to (E64).
+Numer. Meth. Engng 53 (2002), 2271 (energy and momentum of constrained systems). equations.md, (E58) to (E65).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
+from pendbench.base.arrays import FloatArray
 from pendbench.solvers.closing import Chain, close, room_for
 from pendbench.solvers.methods import FixedStep, Form, add
 from pendbench.solvers.rods import (
     BDF2,
+    CHANGING,
     CONSERVING,
     EULER,
     FINEST,
+    PULLED,
+    RESTING,
+    TURNING,
     State,
     accelerate,
     accept,
@@ -39,6 +45,7 @@ from pendbench.solvers.rods import (
     miss,
     propose,
     restart,
+    rub,
     start,
     write_rates,
 )
@@ -46,8 +53,17 @@ from pendbench.solvers.rods import (
 #: A step is cut into so many parts at most where it closes, but misses.
 MOST_FOR_A_MISS = 4
 
+#: Cutting pays where it makes a miss smaller by this factor at least. It does not where a whip cracks.
+PAYS = 0.6
+
 #: How far, in lengths of the chain, a step of `bdf2` may take a point from where the motion before would.
-FAR_OFF = 7e-4
+FAR_OFF = 3e-4
+
+#: How many steps are of order 1 after one of order 2 has no solution.
+CALMING = 6
+
+# What steps of order 1 begin with, and into how many halves one is cut at most where speeds are evened out.
+_PLAIN, _HALVES = (TURNING, RESTING, PULLED), 6
 
 # Changes of angles, rad, that end Newton's method: what is left is of the order of their square.
 _CLOSE, _EXACT = 1e-4, 1e-9
@@ -58,32 +74,39 @@ class _Run:
 
     def __init__(self, chain: Chain, state: State, member: int) -> None:
         self.chain, self.state, self.room, self.member = chain, state, room_for(len(state.q)), member
-        self.far = FAR_OFF * float(chain.lengths.sum())
+        self.far, self.missed = FAR_OFF * float(chain.lengths.sum()), math.inf
 
-    def closes(self, member: int, h: float, plainly: bool) -> bool:
-        """Whether a step of h (s) of that member does."""
-        propose(self.chain, self.state, self.room, member, h, plainly)
+    def closes(self, member: int, h: float, guesses: tuple[int, ...]) -> bool:
+        """Whether a step of h (s) of that member does, from one of the guesses."""
         share, tolerance = (0.5, _EXACT) if member == CONSERVING else (1.0, _CLOSE)
-        closed: bool = close(self.chain, self.room, self.state.q, share, tolerance)
-        return closed
+        for guess in guesses:
+            propose(self.chain, self.state, self.room, member, h, guess)
+            if close(self.chain, self.room, self.state.q, share, tolerance):
+                return True
+        return False
 
     def step(self, h: float, cuttable: bool) -> float | None:
         """Take a step of h (s): by how much the next may be longer; None where it has to be cut.
 
         cuttable: whether it is long enough to be cut for no more than a miss.
         """
-        if self.closes(self.member, h, False):
+        rough = self.state.steps[3] > 0
+        if self.member != EULER and not rough and self.closes(self.member, h, (CHANGING,)):
             missed = miss(self.chain, self.state, self.room, h) if self.member == BDF2 else 0.0
-            if missed > self.far and cuttable:
+            if missed > self.far and cuttable and missed < PAYS * self.missed:
+                self.missed = missed
                 return None
             if self.member == CONSERVING:
                 accelerate(self.chain, self.state, self.room, h)
             accept(self.chain, self.state, self.room, self.member, h)
-            return 2.0 if missed < 0.1 * self.far else 1.0
-        if self.member != CONSERVING and self.closes(EULER, h, True):
-            accept(self.chain, self.state, self.room, EULER, h)
-            return 2.0
-        return None
+            return 2.0 if missed < 0.1 * self.far or missed >= PAYS * self.missed else 1.0
+        if self.member == CONSERVING:
+            return None
+        if not self.closes(EULER, h, _PLAIN):
+            return None
+        accept(self.chain, self.state, self.room, EULER, h)
+        self.state.steps[3] = self.state.steps[3] - 1 if rough else CALMING
+        return 2.0
 
     def make_whole(self) -> None:
         """Take from the speeds what stretches rods: a shorter step would have to undo it at once."""
@@ -94,22 +117,50 @@ class _Run:
     def frame(self, dt: float) -> bool:
         """Take a step of dt (s), in as many parts as it needs; False, and at its start, where that are too many."""
         left, kept, steps = FINEST, None, self.state.steps
+        self.missed = math.inf
         while left > 0:
             size = math.gcd(left, int(steps[2]))
-            if size < left == FINEST:
-                kept = [array.copy() for array in self.state]
+            if kept is None and size < FINEST:
+                kept = self.keep()
             longer = self.step(dt * size / FINEST, cuttable=size * MOST_FOR_A_MISS > FINEST)
             if longer is not None:
                 left -= size
                 steps[2] = min(FINEST, longer * size)
             elif size > 1:
+                kept = kept or self.keep()
                 steps[2] = size // 2
                 self.make_whole()
             else:
-                for array, before in zip(self.state, kept or (), strict=True):
-                    array[:] = before
-                return False
+                left = FINEST - self.smooth(dt, kept or self.keep())
+                if left == FINEST:
+                    return False
         return True
+
+    def smooth(self, dt: float, before: Sequence[FloatArray]) -> int:
+        """Begin a step of dt (s) again, with speeds evened out until a part of it closes: that part; 0 where none does.
+
+        No step resolves the crack of a whip of many links, where neighbours whirl round each other ever faster.
+        """
+        mass = 1.0 / float(self.chain.couplings.max())
+        for power in range(len(self.state.q).bit_length() if self.member != CONSERVING else 0):
+            for size in (FINEST >> k for k in range(_HALVES)):
+                self.go_back(before)
+                rub(self.chain, self.state, mass * 4.0**power)
+                if self.closes(EULER, dt * size / FINEST, _PLAIN):
+                    accept(self.chain, self.state, self.room, EULER, dt * size / FINEST)
+                    self.state.steps[2:] = size, CALMING
+                    return size
+        self.go_back(before)
+        return 0
+
+    def keep(self) -> list[FloatArray]:
+        """The state as it is."""
+        return [array.copy() for array in self.state]
+
+    def go_back(self, before: Sequence[FloatArray]) -> None:
+        """To a state that was kept."""
+        for array, kept in zip(self.state, before, strict=True):
+            array[:] = kept
 
 
 def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int) -> int:

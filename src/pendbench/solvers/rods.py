@@ -1,7 +1,7 @@
 """The steps of implicit methods for long chains: formulas over whole rods, from the last steps to the next.
 
 `implicit` says which methods these are and puts the steps in a row; `closing` has Newton's method. equations.md, (E58)
-to (E64).
+to (E65).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pendbench.solvers.closing import (
     ROD_X,
     ROD_Y,
     SPARE,
+    TURN,
     WANTED_X,
     WANTED_Y,
     Chain,
@@ -35,6 +36,10 @@ FINEST = 1024
 #: The members: implicit Euler, BDF2, and the one that conserves energy and momentum.
 EULER, BDF2, CONSERVING = 1, 2, 3
 
+#: What Newton's method begins with: the last turning and how it changed; the last turning; the angles before; or the
+#: way each rod would point without pulls, which is near where it ends when it turns far in a step.
+CHANGING, TURNING, RESTING, PULLED = 0, 1, 2, 3
+
 #: Of a first step, the length squared times the largest angular acceleration, rad.
 _FIRST_TURN = 0.2
 
@@ -47,7 +52,8 @@ class State(NamedTuple):
 
     q, v (n,): angles and rates after the last step. memory (12, n): the rods (x, y), m, their speeds (x, y), m/s, and
     both before the last step; the mean rates of the last two steps, rad/s; tensions, N, and how they changed, N/s.
-    steps (3,): the length of the last two, s, and the part of a step, of `FINEST`, to try next; 0 before the first.
+    steps (4,): the length of the last two, s; the part of a step, of `FINEST`, to try next, 0 before the first; and how
+    many more steps are to be of order 1.
     """
 
     q: FloatArray
@@ -75,7 +81,7 @@ class _Formula(NamedTuple):
 
 def begin(q: FloatArray, v: FloatArray) -> State:
     """The state at the start, copied."""
-    return State(q.copy(), v.copy(), np.zeros((12, len(q))), np.zeros(3))
+    return State(q.copy(), v.copy(), np.zeros((12, len(q))), np.zeros(4))
 
 
 @inlined
@@ -187,12 +193,13 @@ def start(chain: Chain, state: State, room: Room, dt: float) -> None:
 
 
 @compiled
-def propose(chain: Chain, state: State, room: Room, member: int, h: float, plainly: bool) -> None:
-    """Write what a step of h (s) of a member wants, and a guess. plainly: that the last goes on, not how it changed."""
+def propose(chain: Chain, state: State, room: Room, member: int, h: float, guess: int) -> None:
+    """Write what a step of h (s) of a member wants, and one of the guesses."""
     rows, memory, n, last, before = room.rows, state.memory, len(state.q), state.steps[0], state.steps[1]
     f = _formula(member, h, h / last)
-    ahead = 0.0 if plainly else (h + last) / (last + before)
-    later = 0.0 if plainly else h
+    ahead = (h + last) / (last + before) if guess == CHANGING else 0.0
+    later = h if guess == CHANGING else 0.0
+    going = 0.0 if guess == RESTING else h
     for axis in range(2):
         for i in range(n):
             rows[WANTED_X + axis, i] = f.rod * memory[_ROD + axis, i] + f.speed * memory[_SPEED + axis, i]
@@ -203,8 +210,13 @@ def propose(chain: Chain, state: State, room: Room, member: int, h: float, plain
     rows[WANTED_Y, 0] -= f.scale * chain.gravity
     for i in range(n):
         rate = memory[_TURNED, i]
-        rows[ANGLE, i] = state.q[i] + h * (rate + ahead * (rate - memory[_TURNED_BEFORE, i]))
+        rows[ANGLE, i] = state.q[i] + going * (rate + ahead * (rate - memory[_TURNED_BEFORE, i]))
         rows[PULL, i] = f.scale * (memory[_TENSION, i] + later * memory[_TENSION_RATE, i])
+    if guess == PULLED:
+        for i in range(n):
+            angle = np.arctan2(rows[WANTED_X, i], -rows[WANTED_Y, i])
+            rows[ANGLE, i] = angle - TURN * np.round((angle - state.q[i]) / TURN)
+            rows[PULL, i] = max(rows[PULL, i], 0.0)
 
 
 @compiled
@@ -218,6 +230,21 @@ def miss(chain: Chain, state: State, room: Room, h: float) -> float:
         y += lengths[i] * rows[ROD_Y, i] - memory[_ROD + 1, i] - h * v_y - half * (v_y - memory[_SPEED_BEFORE + 1, i])
         worst = max(worst, x * x + y * y)
     return float(np.sqrt(worst))
+
+
+def rub(chain: Chain, state: State, mass: float) -> None:
+    """Let neighbours rub off on each other: masses change their speeds by `mass` (kg) times those between them.
+
+    What differs over fewer than sqrt(mass/m) masses m is evened out, and no energy comes of it: (1 + mass A) v = v_0 in
+    the speeds of the rods, where A are the couplings. equations.md, (E65).
+    """
+    from scipy.linalg import solveh_banded
+
+    couplings = mass * chain.couplings
+    bands = np.stack([1.0 + couplings[:-1] + couplings[1:], np.append(-couplings[1:-1], 0.0)])
+    speeds = state.memory[_SPEED : _SPEED + 2]
+    speeds[:] = solveh_banded(bands, speeds.T, lower=True, check_finite=False).T
+    state.memory[_TURNED] = 0.0
 
 
 @compiled
