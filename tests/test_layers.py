@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -219,6 +220,15 @@ def test_an_adapter_imports_its_own_library_and_numpy(engine):
     foreign = set().union(*map(libraries, its)) - set(sys.stdlib_module_names)
     assert its
     assert foreign <= {"numpy", engine}
+
+
+def test_a_worker_loads_no_library_that_its_first_job_may_not_need():
+    """They take from a quarter of a second to a whole one, of every process."""
+    names = ", ".join(f"pendbench.kinds.{name}.work" for name in kinds())
+    heavy = ("matplotlib", "mujoco", "pandas", "pydantic", "pymunk", "scipy.integrate", "scipy.linalg")
+    code = f"import sys, {names}; print(*sorted(set({heavy}) & set(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == []
 
 
 def test_every_part_named_here_exists():

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.integrate import DOP853 as SCIPY_S
 
 from pendbench.solvers.dop853 import DOP853
 from pendbench.solvers.rk4 import RK4
@@ -77,3 +78,15 @@ def test_error_estimates_vanish_to_their_order_and_no_further(weights, order):
     for size in range(1, order + 1):
         np.testing.assert_allclose(defects(DOP853, error, size, exact=False), 0.0, atol=ROUNDING)
     assert np.abs(defects(DOP853, error, order + 1, exact=False)).max() > 1e-5
+
+
+def test_the_coefficients_are_scipy_s_to_the_last_bit():
+    stages = len(DOP853.b)
+    for ours, theirs in (
+        (DOP853.a, SCIPY_S.A[:stages, :stages]),
+        (DOP853.b, SCIPY_S.B),
+        (DOP853.c, SCIPY_S.C[:stages]),
+        (DOP853.error5, SCIPY_S.E5[:stages]),  # whose last weight, 0, is of the derivative after the step
+        (DOP853.error3, SCIPY_S.E3[:stages]),
+    ):
+        np.testing.assert_array_equal(ours, theirs)

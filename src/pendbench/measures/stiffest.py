@@ -6,7 +6,6 @@ import math
 from typing import Final
 
 import numpy as np
-from scipy.linalg import eigh
 
 from pendbench.base.arrays import FloatArray
 from pendbench.physics import acting, dense
@@ -23,6 +22,8 @@ def stiffest(scene: Scene) -> float:
     """
     if acting.is_plain(scene):
         return float(normal_modes(scene)[0][-1]) if scene.effects.gravity else math.nan
+    from scipy.linalg import eigh
+
     largest = float(eigh(_stiffness(scene), dense.mass_matrix(scene, np.zeros(scene.n)), eigvals_only=True)[-1])
     return math.sqrt(largest) if largest > 0.0 else math.nan
 

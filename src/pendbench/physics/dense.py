@@ -7,7 +7,6 @@ dense system loses digits where masses differ by many decades (equations.md, "Wh
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from pendbench.base.arrays import FloatArray
 from pendbench.physics import acting
@@ -46,6 +45,8 @@ def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float =
     Raises scipy.linalg.LinAlgError where rounding has left C without its positive definiteness (masses that differ
     by many decades). equations.md (E6), (E40); the note's (14), which has no Q.
     """
+    from scipy.linalg import cho_factor, cho_solve  # a quarter of a second, and most processes never come here
+
     torques = coupling_matrix(scene, theta) @ omega**2 - weight_torques(scene, theta, t)
     torques += acting.generalized_forces(scene, t, theta, omega)
     return np.asarray(cho_solve(cho_factor(mass_matrix(scene, theta)), torques))

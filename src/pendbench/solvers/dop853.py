@@ -1,11 +1,13 @@
-"""Dormand and Prince's method of order 8 with Hairer's two estimates of its error: coefficients for `adaptive`."""
+"""Dormand and Prince's method of order 8 with Hairer's two estimates of its error: coefficients for `adaptive`.
+
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, p. 181, and code DOP853.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853 as _SCIPY_DOP853
 
 from pendbench.base.arrays import FloatArray
 
@@ -21,14 +23,54 @@ class EmbeddedPair(NamedTuple):
     order: int
 
 
-# Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, p. 181, and code DOP853. scipy publishes the
-# coefficients; its error weights have a last entry, zero, for the derivative after the step.
-_STAGES = len(_SCIPY_DOP853.B)
+# As they are published; scipy has the same, but it takes a process a third of a second to load.
+# fmt: off
+_A = (
+    (),
+    (0.05260015195876773,),
+    (0.0197250569845379, 0.0591751709536137),
+    (0.02958758547680685, 0.0, 0.08876275643042054),
+    (0.2413651341592667, 0.0, -0.8845494793282861, 0.924834003261792),
+    (0.037037037037037035, 0.0, 0.0, 0.17082860872947386, 0.12546768756682242),
+    (0.037109375, 0.0, 0.0, 0.17025221101954405, 0.06021653898045596, -0.017578125),
+    (0.03709200011850479, 0.0, 0.0, 0.17038392571223998, 0.10726203044637328, -0.015319437748624402,
+     0.008273789163814023),
+    (0.6241109587160757, 0.0, 0.0, -3.3608926294469414, -0.868219346841726, 27.59209969944671, 20.154067550477894,
+     -43.48988418106996),
+    (0.47766253643826434, 0.0, 0.0, -2.4881146199716677, -0.590290826836843, 21.230051448181193, 15.279233632882423,
+     -33.28821096898486, -0.020331201708508627),
+    (-0.9371424300859873, 0.0, 0.0, 5.186372428844064, 1.0914373489967295, -8.149787010746927, -18.52006565999696,
+     22.739487099350505, 2.4936055526796523, -3.0467644718982196),
+    (2.273310147516538, 0.0, 0.0, -10.53449546673725, -2.0008720582248625, -17.9589318631188, 27.94888452941996,
+     -2.8589982771350235, -8.87285693353063, 12.360567175794303, 0.6433927460157636),
+)
+_B = (
+    0.054293734116568765, 0.0, 0.0, 0.0, 0.0, 4.450312892752409, 1.8915178993145003, -5.801203960010585,
+    0.3111643669578199, -0.1521609496625161, 0.20136540080403034, 0.04471061572777259,
+)
+_C = (
+    0.0, 0.05260015195876773, 0.0789002279381516, 0.1183503419072274, 0.2816496580927726, 0.3333333333333333, 0.25,
+    0.3076923076923077, 0.6512820512820513, 0.6, 0.8571428571428571, 1.0,
+)
+_ERROR5 = (
+    0.01312004499419488, 0.0, 0.0, 0.0, 0.0, -1.2251564463762044, -0.4957589496572502, 1.6643771824549864,
+    -0.35032884874997366, 0.3341791187130175, 0.08192320648511571, -0.022355307863886294,
+)
+_ERROR3 = (
+    -0.18980075407240762, 0.0, 0.0, 0.0, 0.0, 4.450312892752409, 1.8915178993145003, -5.801203960010585,
+    -0.4226823213237919, -0.1521609496625161, 0.20136540080403034, 0.02265179219836082,
+)
+# fmt: on
+
+
+def _square(rows: tuple[tuple[float, ...], ...]) -> FloatArray:
+    """The rows of a lower triangle, (s, s)."""
+    found = np.zeros((len(rows), len(rows)))
+    for row, values in zip(found, rows, strict=True):
+        row[: len(values)] = values
+    return found
+
+
 DOP853 = EmbeddedPair(
-    a=np.ascontiguousarray(_SCIPY_DOP853.A[:_STAGES, :_STAGES]),
-    b=np.array(_SCIPY_DOP853.B),
-    c=np.array(_SCIPY_DOP853.C[:_STAGES]),
-    error5=np.array(_SCIPY_DOP853.E5[:_STAGES]),
-    error3=np.array(_SCIPY_DOP853.E3[:_STAGES]),
-    order=8,
+    a=_square(_A), b=np.array(_B), c=np.array(_C), error5=np.array(_ERROR5), error3=np.array(_ERROR3), order=8
 )
