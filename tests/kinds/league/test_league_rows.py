@@ -76,6 +76,20 @@ def test_a_cost_is_worth_a_word_where_half_of_the_scenes_are_reached(reached, of
     assert word in EngineRow("mujoco", pairs, ratio=20.0).verdict
 
 
+def test_where_no_truth_is_known_the_steadiest_is_the_best_and_the_reason_says_so():
+    own = [
+        row(0.1, follows_s=math.nan, energy_drift_max=4e159, status="energy lost"),
+        row(0.05, follows_s=math.nan, energy_drift_max=0.01),
+        row(0.025, follows_s=math.nan, energy_drift_max=0.02, comes=True),
+    ]
+    found = Found((SCENE,), {SCENE.name: KeptTruth("timed out", "too late")}, frozenset(), {}, {})
+    [only] = pair_rows(found, own, 1e-3)
+    assert only.best is own[1]
+    assert only.reason == "no truth: timed out"
+    [failed] = pair_rows(found, [replace(own[2], run=LeagueRun("not finite", "an angle is not"))], 1e-3)
+    assert failed.reason == "as it comes: not finite: an angle is not; no truth: timed out"
+
+
 def test_an_engine_is_at_its_best_where_it_follows_for_longest_and_of_equals_most_exactly():
     long, exact = row(0.1, follows_s=7.0, error_max=0.5), row(0.05, follows_s=7.0, error_max=0.3)
     assert paired(row(0.2, follows_s=6.0, error_max=0.1), long, exact).best is exact

@@ -111,7 +111,7 @@ _PAIRS: Final = (
         "cost_s_per_s", "s/s", ".2g", "its cost, s per s", "time of one processor for a second of the scene",
         _part("cheapest", lambda row: row.cost_s_per_s), is_time=True,
     ),
-    text_column("reason", "reason", "why the engine refuses the scene, where it does"),
+    text_column("reason", "reason", "why the engine refuses the scene, or what became of it, or of the truth"),
 )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from functools import partial
 
 from pendbench.kinds.league.challenge import Entry, challenge_tables
 from pendbench.kinds.league.plots import cost_figure
-from pendbench.kinds.league.rows import CaseRow, EngineRow, PairRow, rows_with_ratios
+from pendbench.kinds.league.rows import CaseRow, EngineRow, PairRow, SceneRow, rows_with_ratios
 from pendbench.kinds.league.study import LEAVES, OWN, Found
 from pendbench.kinds.league.verdicts import STANDARD
 from pendbench.report.columns import Table
@@ -44,7 +44,7 @@ class Facts:
 
     here: engines that are there; others: the same without our own, whose costs are over the cheapest of them. first:
     the best of them. steady: whose energy stays as they come. absent: those that are not there. known_s: how long the
-    truths of all scenes are known together.
+    truths of all scenes are known together. untold: scenes whose truth is not known.
     """
 
     here: Table
@@ -58,6 +58,7 @@ class Facts:
     leaves: float
     known_s: float
     proven: Sequence[Proven]
+    untold: Sequence[SceneRow]
 
 
 def facts(results: Results[Found], tables: dict[str, Table]) -> Facts:
@@ -84,6 +85,7 @@ def facts(results: Results[Found], tables: dict[str, Table]) -> Facts:
         leaves=LEAVES,
         known_s=sum(row.known_s for row in tables["scenes"]),
         proven=proven(row.scene for row in tables["scenes"]),
+        untold=[row for row in tables["scenes"] if not row.known_s > 0],
     )
 
 

@@ -155,27 +155,36 @@ def case_rows(found: Found) -> Iterator[CaseRow]:
 
 def pair_rows(found: Found, cases: Sequence[CaseRow], goal: float) -> Iterator[PairRow]:
     """A row for each scene and engine."""
-    known = {row.scene.name: row.known_s for row in scene_rows(found)}
+    scenes = {row.scene.name: row for row in scene_rows(found)}
     for (scene, name), own in grouped(cases, lambda row: (row.case.scene.name, row.case.engine)).items():
         able = [row for row in own if row.status != "refused"]
         standard = next((row for row in own if row.as_it_comes), None)
         yield PairRow(
             scene=scene,
             engine=name,
-            known_s=known[scene],
+            known_s=scenes[scene].known_s,
             standard=standard,
             best=max(able, key=_goodness, default=None),
             stable=max((row for row in able if _holds(row)), key=lambda row: row.case.dt or 0.0, default=None),
             cheapest=_cheapest(able, goal),
-            reason="" if able else own[0].reason,
+            reason=_why(own, standard, scenes[scene].truth),
         )
 
 
-def _goodness(row: CaseRow) -> tuple[float, float, float]:
-    """The longest on the truth first; of those to its end, the most exact."""
+def _goodness(row: CaseRow) -> tuple[float, float, float, float]:
+    """The longest on the truth first; of those to its end, the most exact; where no truth is known, the steadiest."""
     follows, error = row.run.follows_s, row.run.error_max
     whole = follows if follows >= 0 else -1.0
-    return whole, -error if error >= 0 else -math.inf, row.case.dt or 0.0
+    return whole, -error if error >= 0 else -math.inf, -_energy(row), row.case.dt or 0.0
+
+
+def _why(own: Sequence[CaseRow], standard: CaseRow | None, truth: KeptTruth) -> str:
+    """Why an engine has no numbers in a scene, or some are missing."""
+    if all(row.status == "refused" for row in own):
+        return own[0].reason
+    late = "" if truth.horizon > 0 else f"no truth: {truth.status}"
+    failed = "" if standard is None or standard.status == "ok" else f"as it comes: {standard.status}: {standard.reason}"
+    return "; ".join(text for text in (failed, late) if text)
 
 
 def _holds(row: CaseRow) -> bool:

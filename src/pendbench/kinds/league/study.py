@@ -31,6 +31,8 @@ from pendbench.study.truths import KeptTruth, measure_truth
 
 #: The error at which a run has left the truth, in lengths of the chain.
 LEAVES: Final = 0.01
+#: How many times a run's limit of processor time a truth may take: all engines are judged by it.
+TRUTH_SHARE: Final = 10.0
 #: This project's own engine: a host should not be its own contestant, so there is a table without it.
 OWN: Final = "analytic"
 
@@ -120,7 +122,9 @@ def measure(plan: Plan, runner: Runner) -> Found:
     refusals = refused(runner, cases)
     accepted = sorted((case for case in cases if case not in refusals), key=lambda case: _effort(case, options))
     compile_kernels(runner, plan.scenes, accepted)
-    truths = {scene.name: task(measure_truth, *_truth_of(scene, cases, options)) for scene in plan.scenes}
+    truths = {
+        scene.name: task(measure_truth, *_truth_of(scene, cases, options), share=TRUTH_SHARE) for scene in plan.scenes
+    }
     known = runner.run("the truth", truths)
     ran = runner.run("the engines", {case: _run(case, options, truths) for case in accepted})
     runs = ran | {case: LeagueRun(*fault) for case, fault in refusals.items()}
