@@ -27,7 +27,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from pendbench.base.arrays import FloatArray
-from pendbench.solvers.closing import Chain, close, room_for
+from pendbench.solvers.closing import Chain, close
 from pendbench.solvers.methods import FixedStep, Form, add
 from pendbench.solvers.rods import (
     BDF2,
@@ -70,18 +70,18 @@ _CLOSE, _EXACT = 1e-4, 1e-9
 
 
 class _Run:
-    """A chain, its state and where steps are computed, for the length of a call."""
+    """A chain and its state, for the length of a call."""
 
     def __init__(self, chain: Chain, state: State, member: int) -> None:
-        self.chain, self.state, self.room, self.member = chain, state, room_for(len(state.q)), member
+        self.chain, self.state, self.member = chain, state, member
         self.far, self.missed = FAR_OFF * float(chain.lengths.sum()), math.inf
 
     def closes(self, member: int, h: float, guesses: tuple[int, ...]) -> bool:
         """Whether a step of h (s) of that member does, from one of the guesses."""
         share, tolerance = (0.5, _EXACT) if member == CONSERVING else (1.0, _CLOSE)
         for guess in guesses:
-            propose(self.chain, self.state, self.room, member, h, guess)
-            if close(self.chain, self.room, self.state.q, share, tolerance):
+            propose(self.chain, self.state, member, h, guess)
+            if close(self.chain, self.state.room, self.state.q, share, tolerance):
                 return True
         return False
 
@@ -92,27 +92,27 @@ class _Run:
         """
         rough = self.state.steps[3] > 0
         if self.member != EULER and not rough and self.closes(self.member, h, (CHANGING,)):
-            missed = miss(self.chain, self.state, self.room, h) if self.member == BDF2 else 0.0
+            missed = miss(self.chain, self.state, h) if self.member == BDF2 else 0.0
             if missed > self.far and cuttable and missed < PAYS * self.missed:
                 self.missed = missed
                 return None
             if self.member == CONSERVING:
-                accelerate(self.chain, self.state, self.room, h)
-            accept(self.chain, self.state, self.room, self.member, h)
+                accelerate(self.chain, self.state, h)
+            accept(self.chain, self.state, self.member, h)
             return 2.0 if missed < 0.1 * self.far or missed >= PAYS * self.missed else 1.0
         if self.member == CONSERVING:
             return None
         if not self.closes(EULER, h, _PLAIN):
             return None
-        accept(self.chain, self.state, self.room, EULER, h)
+        accept(self.chain, self.state, EULER, h)
         self.state.steps[3] = self.state.steps[3] - 1 if rough else CALMING
         return 2.0
 
     def make_whole(self) -> None:
         """Take from the speeds what stretches rods: a shorter step would have to undo it at once."""
         if self.member != CONSERVING:
-            write_rates(self.chain, self.state, self.room)
-            restart(self.chain, self.state, self.room)
+            write_rates(self.chain, self.state)
+            restart(self.chain, self.state)
 
     def frame(self, dt: float) -> bool:
         """Take a step of dt (s), in as many parts as it needs; False, and at its start, where that are too many."""
@@ -147,7 +147,7 @@ class _Run:
                 self.go_back(before)
                 rub(self.chain, self.state, mass * 4.0**power)
                 if self.closes(EULER, dt * size / FINEST, _PLAIN):
-                    accept(self.chain, self.state, self.room, EULER, dt * size / FINEST)
+                    accept(self.chain, self.state, EULER, dt * size / FINEST)
                     self.state.steps[2:] = size, CALMING
                     return size
         self.go_back(before)
@@ -155,11 +155,11 @@ class _Run:
 
     def keep(self) -> list[FloatArray]:
         """The state as it is."""
-        return [array.copy() for array in self.state]
+        return [array.copy() for array in self.state[:-1]]
 
     def go_back(self, before: Sequence[FloatArray]) -> None:
         """To a state that was kept."""
-        for array, kept in zip(self.state, before, strict=True):
+        for array, kept in zip(self.state[:-1], before, strict=True):
             array[:] = kept
 
 
@@ -170,10 +170,10 @@ def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int) -
     """
     run, taken = _Run(chain, state, member), 0
     if state.steps[2] == 0.0:
-        start(chain, state, run.room, dt)
+        start(chain, state, dt)
     while taken < steps and run.frame(dt):
         taken += 1
-    write_rates(chain, state, run.room)
+    write_rates(chain, state)
     return taken
 
 

@@ -27,6 +27,7 @@ from pendbench.solvers.closing import (
     WANTED_Y,
     Chain,
     Room,
+    room_for,
     write_rods,
 )
 
@@ -53,13 +54,14 @@ class State(NamedTuple):
     q, v (n,): angles and rates after the last step. memory (12, n): the rods (x, y), m, their speeds (x, y), m/s, and
     both before the last step; the mean rates of the last two steps, rad/s; tensions, N, and how they changed, N/s.
     steps (4,): the length of the last two, s; the part of a step, of `FINEST`, to try next, 0 before the first; and how
-    many more steps are to be of order 1.
+    many more steps are to be of order 1. room: where steps are computed.
     """
 
     q: FloatArray
     v: FloatArray
     memory: FloatArray
     steps: FloatArray
+    room: Room
 
 
 class _Formula(NamedTuple):
@@ -81,7 +83,7 @@ class _Formula(NamedTuple):
 
 def begin(q: FloatArray, v: FloatArray) -> State:
     """The state at the start, copied."""
-    return State(q.copy(), v.copy(), np.zeros((12, len(q))), np.zeros(4))
+    return State(q.copy(), v.copy(), np.zeros((12, len(q))), np.zeros(4), room_for(len(q)))
 
 
 @inlined
@@ -132,11 +134,11 @@ def _across(chain: Chain, rows: FloatArray, i: int, x: float, y: float) -> float
 
 
 @compiled
-def write_rates(chain: Chain, state: State, room: Room) -> None:
+def write_rates(chain: Chain, state: State) -> None:
     """The rates of the motion nearest to the speeds that keeps the rods' lengths. equations.md, (E64)."""
-    rows, memory, n = room.rows, state.memory, len(state.q)
-    write_rods(state.q, rows, ROD_Y)
+    rows, memory, n = state.room.rows, state.memory, len(state.q)
     for i in range(n):
+        rows[ROD_X, i], rows[ROD_Y, i] = memory[_ROD, i] / chain.lengths[i], memory[_ROD + 1, i] / chain.lengths[i]
         rows[SPARE, i] = rows[ROD_X, i] * memory[_SPEED, i] + rows[ROD_Y, i] * memory[_SPEED + 1, i]
     _solve_rods(chain, rows, n)
     for i in range(n):
@@ -155,18 +157,18 @@ def _write_motion(
 
 
 @compiled
-def restart(chain: Chain, state: State, room: Room) -> None:
+def restart(chain: Chain, state: State) -> None:
     """Go on from speeds that keep the rods' lengths, those of the rates."""
-    _write_motion(chain, state.memory, room.rows, state.q, state.v, _ROD)
+    _write_motion(chain, state.memory, state.room.rows, state.q, state.v, _ROD)
 
 
 @compiled
-def start(chain: Chain, state: State, room: Room, dt: float) -> None:
+def start(chain: Chain, state: State, dt: float) -> None:
     """What a first step looks back on: the motion before the start, from the accelerations there.
 
     It is so short a part of dt (s) that no rod turns far in it.
     """
-    rows, memory, n = room.rows, state.memory, len(state.q)
+    rows, memory, n = state.room.rows, state.memory, len(state.q)
     _write_motion(chain, memory, rows, state.q, state.v, _ROD)
     for i in range(n):
         pull = -chain.gravity * rows[ROD_Y, i] if i == 0 else 0.0
@@ -193,9 +195,9 @@ def start(chain: Chain, state: State, room: Room, dt: float) -> None:
 
 
 @compiled
-def propose(chain: Chain, state: State, room: Room, member: int, h: float, guess: int) -> None:
+def propose(chain: Chain, state: State, member: int, h: float, guess: int) -> None:
     """Write what a step of h (s) of a member wants, and one of the guesses."""
-    rows, memory, n, last, before = room.rows, state.memory, len(state.q), state.steps[0], state.steps[1]
+    rows, memory, n, last, before = state.room.rows, state.memory, len(state.q), state.steps[0], state.steps[1]
     f = _formula(member, h, h / last)
     ahead = (h + last) / (last + before) if guess == CHANGING else 0.0
     later = h if guess == CHANGING else 0.0
@@ -220,9 +222,9 @@ def propose(chain: Chain, state: State, room: Room, member: int, h: float, guess
 
 
 @compiled
-def miss(chain: Chain, state: State, room: Room, h: float) -> float:
+def miss(chain: Chain, state: State, h: float) -> float:
     """How far (m) the points are from where speeds and their last change would take them."""
-    rows, memory, lengths = room.rows, state.memory, chain.lengths
+    rows, memory, lengths = state.room.rows, state.memory, chain.lengths
     x, y, worst, half = 0.0, 0.0, 0.0, 0.5 * h * h / state.steps[0]
     for i in range(len(lengths)):
         v_x, v_y = memory[_SPEED, i], memory[_SPEED + 1, i]
@@ -248,12 +250,12 @@ def rub(chain: Chain, state: State, mass: float) -> None:
 
 
 @compiled
-def accelerate(chain: Chain, state: State, room: Room, h: float) -> None:
+def accelerate(chain: Chain, state: State, h: float) -> None:
     """Change the speeds by what pulls along the mean of old and new rods, and gravity, do in a step of h (s).
 
     (E63) says the same by positions, whose rounding errors over h would add up where nothing damps.
     """
-    rows, couplings, n = room.rows, chain.couplings, len(state.q)
+    rows, couplings, n = state.room.rows, chain.couplings, len(state.q)
     for i in range(n):
         rows[SPARE, i] = 0.5 * (state.q[i] + rows[ANGLE, i])
     write_rods(rows[SPARE, :n], rows, ALONG_Y)
@@ -269,9 +271,9 @@ def accelerate(chain: Chain, state: State, room: Room, h: float) -> None:
 
 
 @compiled
-def accept(chain: Chain, state: State, room: Room, member: int, h: float) -> None:
+def accept(chain: Chain, state: State, member: int, h: float) -> None:
     """Go on to what closed."""
-    rows, memory, n = room.rows, state.memory, len(state.q)
+    rows, memory, n = state.room.rows, state.memory, len(state.q)
     f = _formula(member, h, h / state.steps[0])
     for axis in range(2):
         rod_row = ROD_X if axis == 0 else ROD_Y
