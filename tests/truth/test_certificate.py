@@ -14,6 +14,7 @@ import pytest
 from pendbench.__main__ import main
 from pendbench.base.bundled import bundled, bundled_names
 from pendbench.base.errors import InputError
+from pendbench.commands import prove as prove_command
 from pendbench.physics.geometry import distance
 from pendbench.scene.scene import load_scene
 from pendbench.truth.proof.certificate import _digest, check_doubles, read_proof
@@ -204,6 +205,13 @@ def test_it_ends_at_its_memory_limit_and_goes_on_with_a_higher_one(tmp_path, cap
     assert np.array_equal(again.balls[: len(ended.t)], ended.balls)  # goes on, and does not begin anew
     assert main(["prove", "single", "--check", str(out), "--memory", "1"]) == 0
     assert "The other way ends there: it ran into its memory limit" in capsys.readouterr().out
+
+
+@with_flint
+def test_without_a_limit_half_of_the_machines_memory_is_one(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(prove_command, "machine_memory", lambda: 2e6)  # less than twice what Python takes
+    assert main(["prove", "single", "--until", "0.5", "--out", str(tmp_path / "a.npz")]) == 0
+    assert "memory limit" in capsys.readouterr().out
 
 
 @with_flint

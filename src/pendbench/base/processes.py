@@ -39,6 +39,13 @@ def memory_held() -> int:
     return int(psutil.Process().memory_info().rss)
 
 
+def machine_memory() -> int:
+    """The memory that this machine has, bytes."""
+    import psutil
+
+    return int(psutil.virtual_memory().total)
+
+
 def refuse_without_guard() -> None:
     """Leave where a script starts processes on a line that each of them would run, too.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pendbench.base.errors import InputError
+from pendbench.base.processes import machine_memory
 from pendbench.commands.completing import scene_names
 from pendbench.commands.shell import OK, REGRESSION, number, say
 
@@ -29,7 +30,9 @@ def add_options(options: argparse.ArgumentParser) -> None:
     options.add_argument("--out", metavar="F.npz", help="the certificate (default: SCENE.proof.npz)")
     options.add_argument("--check", metavar="F.npz", help="check this certificate by another way; makes none")
     options.add_argument("--within", type=float, metavar="S", help="at most so much processor time; it can go on later")
-    options.add_argument("--memory", type=float, metavar="MB", help="at most so much memory; it can go on later")
+    options.add_argument(
+        "--memory", type=float, metavar="MB", help="at most so much memory (default: half of the machine's)"
+    )
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -94,7 +97,7 @@ def _check(scene: Scene, chosen: argparse.Namespace) -> int:
 
 def _limits(chosen: argparse.Namespace) -> dict[str, float]:
     within = math.inf if chosen.within is None else number("--within", chosen.within, _SPAN)
-    memory = math.inf if chosen.memory is None else 1e6 * number("--memory", chosen.memory, _MEMORY)
+    memory = machine_memory() / 2 if chosen.memory is None else 1e6 * number("--memory", chosen.memory, _MEMORY)
     return {"within": within, "memory": memory}
 
 
