@@ -21,17 +21,20 @@ from pendbench.engines.protocol import Mapped
 from pendbench.kinds.effects import study as effects
 from pendbench.kinds.effects import work
 from pendbench.kinds.effects.columns import SceneRow, _claimed
+from pendbench.kinds.effects.page import facts
 from pendbench.kinds.effects.plots import price_figure
 from pendbench.kinds.effects.work import EffectRun, Price, compared_times, measure_effect, measure_prices, run_times
+from pendbench.measures.energy import Balance
 from pendbench.report.page import Report
 from pendbench.report.tables import data_frame
 from pendbench.scene.scene import Effects, load_scene
+from pendbench.scene.trajectory import Trajectory
 from pendbench.study.case import Case
 from pendbench.study.kernels import compile_kernel
 from pendbench.study.plan import load_plan
 from pendbench.study.results import Results
 from pendbench.study.timing import Timed
-from pendbench.study.truths import KeptTruth, measure_truth
+from pendbench.study.truths import Compared, KeptTruth, measure_truth
 from support.job_functions import fail_to_price
 from support.reading import section, tables_of
 from support.scenes import chain
@@ -313,6 +316,59 @@ def test_rows_without_a_truth_keep_their_balance_and_name_it():
     assert "the truth of damped_double: **timed out**: took longer than 20 s" in page
 
 
+def test_a_spread_is_a_share_of_its_price_and_the_median_counts():
+    """Of 0, 0, 0, 0.1 of 1.5, 0.2 of 1.1 and 1.1 of 4."""
+    report = made(prices=PRICES)
+    found = facts(report.results, report.tables)
+    assert found.spread_median == pytest.approx((0.0 + 0.1 / 1.5) / 2)
+    assert found.spread_worst == pytest.approx(1.1 / 4.0)
+    assert found.priced == 3
+
+
+def test_only_what_was_refused_counts_as_refused():
+    report = made(refused=[("kapitza", "pymunk", "tuned", 1e-3)])
+    failed = Case(KAPITZA, "pymunk", "default", 1e-3)
+    report.results.found.runs[failed] = EffectRun("not finite", "an angle is not finite")
+    assert facts(report.results, report.tables).refused == 1
+
+
+def test_a_method_that_was_never_compared_is_not_the_best_of_its_engine():
+    errors = {**ERRORS, ("damped_double", "pymunk", "tuned", 1e-3): (np.nan, 1e-7)}
+    report = made(errors=errors)
+    best = facts(report.results, report.tables).best
+    assert [row.case.engine for row in best] == ["analytic", "mujoco"]
+
+
+def test_upright_are_single_links_on_a_driven_pivot():
+    report = made()
+    two = dataclasses.replace(load_scene("everything"), name="two")
+    assert two.n > 1
+    case = Case(two, "analytic", "rk4", 1e-3)
+    found = report.results.found
+    runs = {**found.runs, case: EffectRun("ok", "", 100, 1e-6, 0.0, 0.3, 1e-6, 1e-9)}
+    scenes, truths = (*found.scenes, two), {**found.truths, "two": TRUTH}
+    results = dataclasses.replace(
+        report.results, found=dataclasses.replace(found, scenes=scenes, truths=truths, runs=runs)
+    )
+    upright = facts(results, Report(results).tables).upright
+    assert {row.case.scene.name for row in upright} == {"kapitza"}
+    assert len(upright) == 2
+
+
+def test_a_run_has_the_largest_of_its_numbers(monkeypatch):
+    """Angles that start at 1 rad and get 0.5 rad away from there, an energy that strays by 0.3 and comes back."""
+    scene, t = damped(), np.array([0.0, 0.01, 0.02, 0.03])
+    theta = scene.angles + np.array([[0.0, 0.0], [0.1, -0.5], [0.2, 0.1], [0.1, 0.0]])
+    run = Trajectory(t, theta, np.zeros((4, 2)), np.array([0.0, 0.3, 0.1, 0.2]), steps=3)
+    balance = Balance(t, np.array([1.0, 0.4, 1.4, 1.2]), 2.0, np.array([0.0, 1e-3, 4e-3, 2e-3]), works=True)
+    zeros = np.zeros((4, 2))
+    compared = Compared(t, np.array([0.0, 0.004, 0.008, 0.002]), zeros[:, 0], zeros[:, 0], zeros, zeros)
+    for name, value in (("run_case", run), ("energy_balance", balance), ("compare", compared)):
+        monkeypatch.setattr(work, name, lambda *_, value=value: value)
+    found = measure_effect(Case(scene, "mujoco", "rk4", 0.01), KeptTruth("ok", t=t))
+    assert found == EffectRun("ok", "", 3, 0.008, 0.3, pytest.approx(0.5), pytest.approx(0.3), pytest.approx(4e-3))
+
+
 def test_moved_is_the_farthest_of_any_angle():
     moved = dataclasses.replace(TRUTH, theta=damped().angles + np.array([[0.1, -0.4], [0.3, 0.2]]))
     assert SceneRow(damped(), moved).moved_max_rad == pytest.approx(0.4)
@@ -327,6 +383,16 @@ def test_orders_are_those_of_the_errors():
     assert analytic.order_observed == pytest.approx(4.0)
     assert (euler.case.method, euler.order_claimed) == ("euler", 1)
     assert np.isnan(euler.order_observed)
+
+
+def test_an_order_is_of_errors_that_are_neither_large_nor_rounding():
+    """With 0.3 at 4 ms and 1e-13 at 0.5 ms it would be 10 to 23."""
+    far = {
+        ("damped_double", "analytic", "rk4", 4e-3): (0.3, 0.1),
+        ("damped_double", "analytic", "rk4", 5e-4): (1e-13, 0.1),
+    }
+    analytic, *_ = made(errors={**ERRORS, **far}).tables["orders"]
+    assert analytic.order_observed == pytest.approx(4.0)
 
 
 def test_an_order_below_its_claim_is_bold():

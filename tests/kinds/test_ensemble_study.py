@@ -17,16 +17,19 @@ from pendbench.base.faults import Fault
 from pendbench.commands.run import run_study
 from pendbench.engines.analytic.ensemble import first_flips
 from pendbench.execution.pool import Outcome
+from pendbench.kinds.ensemble import work
 from pendbench.kinds.ensemble.columns import PixelRow, _map_columns
 from pendbench.kinds.ensemble.plots import differences_figure
 from pendbench.kinds.ensemble.study import Compared, Energies, Found
 from pendbench.kinds.ensemble.work import ExponentRun, FlipRun, measure_engine_flips
+from pendbench.measures.energy import Balance
 from pendbench.measures.flips import grid_angles, mirrored, pixel_angles
 from pendbench.report.columns import Table
 from pendbench.report.page import Report
 from pendbench.report.sections import definitions
 from pendbench.report.tables import data_frame
 from pendbench.scene.scene import load_scene
+from pendbench.scene.trajectory import Trajectory
 from pendbench.study.ask import ask_refusals
 from pendbench.study.case import Case
 from pendbench.study.plan import load_plan
@@ -311,6 +314,25 @@ def test_a_case_is_told_by_its_pixels():
     assert cases[EULER].agrees == (4, 0, 2, 2, 0, 0.0)  # a flip where there is none is at the edge, too
     assert cases[ours(1e-6)].agrees[:5] == (36, 0, 24, 1, 0)
     assert cases[ours(1e-4)].agrees[:5] == (36, 0, 24, 1, 1)
+
+
+def test_an_engine_s_chains_take_all_their_time_and_have_the_worst_energy(monkeypatch):
+    """Three of them: one flips at 2 s, one never does, and one fails before it does."""
+    t, still = np.array([0.0, 1.0]), np.zeros((2, 2))
+    runs = iter(
+        [Trajectory(t, still, still, t, status, why) for status, why in (("ok", ""), ("ok", ""), ("torn", "it tore"))]
+    )
+    seconds, found_flips = iter([1.0, 2.0, 4.0]), iter([2.0, INF, INF])
+    balances = iter([Balance(t, np.array([0.0, kept]), 2.0, np.array([0.0, floor]), works=True)
+                     for kept, floor in ((0.2, 1e-3), (-0.8, 3e-3), (0.4, 2e-3))])  # fmt: skip
+    monkeypatch.setattr(work, "run_case", lambda *_: next(runs))
+    monkeypatch.setattr(work, "timed", lambda call: (call(), next(seconds)))
+    monkeypatch.setattr(work, "first_flip", lambda *_: next(found_flips))
+    monkeypatch.setattr(work, "energy_balance", lambda *_: next(balances))
+    found = measure_engine_flips(RK4, np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]]))
+    np.testing.assert_array_equal(found.flips, [2.0, INF, NAN])
+    assert (found.run_s, found.energy_drift_max, found.energy_floor) == (7.0, 0.4, 3e-3)
+    assert (found.status, found.reason) == ("torn", "released from 0.5, 0.6 rad: it tore")
 
 
 def test_columns_of_a_case():
