@@ -53,7 +53,7 @@ print("still works", flush=True)
 LONG = {
     "reference": "pb.reference(plain, [end])",
     "reference with effects": "pb.reference(damped, [end])",
-    "adaptive": "pb.simulate(plain, times=[end], most_steps=1e15)",
+    "adaptive": "pb.simulate(plain, method='adaptive', times=[end], most_steps=1e15)",
     "adaptive with effects": "pb.simulate(damped, times=[end], most_steps=1e15)",
     "taylor": "pb.simulate(plain, method='taylor', times=[end], most_steps=1e15)",
     "rk4": "pb.simulate(plain, method='rk4', dt=1e-3, times=[end])",

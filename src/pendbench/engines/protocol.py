@@ -123,6 +123,8 @@ class AdaptiveSimulation(Protocol):
 class Engine(Protocol):
     """A program that can simulate scenes.
 
+    It may say by `default_method(scene, settings)` which method is run where none is named.
+
     It may also have `effects`, a mapping of effects' names to `Mapped`: scenes with others are refused for it, and the
     documentation has them in its table. An engine without one is taken to know gravity, and nothing else.
     """
@@ -138,6 +140,12 @@ class Engine(Protocol):
 
     def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation | AdaptiveSimulation:
         """A run at time 0 in the scene's start. Never timed. `settings` holds only settings the method declares."""
+
+
+def default_method(engine: Engine, scene: Scene, settings: Mapping[str, float | None]) -> str:
+    """The method that is run where none is named: what the engine says of the scene, or the first one it has."""
+    its: Any = getattr(engine, "default_method", None)
+    return str(its(scene, settings)) if callable(its) else next(iter(engine.methods))
 
 
 _GRAVITY_ALONE: Final = {"gravity": Mapped("its adapter does not say")}

@@ -17,7 +17,7 @@ from pendbench.base.faults import STATUSES, Fault
 from pendbench.base.ranges import rising_times
 from pendbench.base.strict import show
 from pendbench.engines.arguments import SAMPLES, even_counts, step_counts, step_of
-from pendbench.engines.protocol import AdaptiveSimulation, Engine, Method, Simulation, State, refusal
+from pendbench.engines.protocol import AdaptiveSimulation, Engine, Method, Simulation, State, default_method, refusal
 from pendbench.engines.registry import engine as engine_of
 from pendbench.engines.registry import engine_names, flaw_of
 from pendbench.execution.limits import uncounted
@@ -55,10 +55,11 @@ def simulate(
     """Run a scene, from its start, and record it.
 
     scene: a `Scene`, or what `load_scene` takes. engine: its name, or the engine itself. method: its name; by default
-    the first one of the engine. dt: the step, s, for a method with a fixed step and only for such. times: (k,) s,
-    increasing, where to record; they may lie beyond the scene's duration. With a fixed step they must be whole
-    multiples of it, to a millionth of it, and the run's `t` holds those multiples. Without times, about 1000 over the
-    scene's duration. settings: what the method can be given, by name; None stands for the default.
+    the engine's first one, and of ours the cheapest for the scene and its tolerance (docs/speed.md). dt: the step, s,
+    for a method with a fixed step and only for such. times: (k,) s, increasing, where to record; they may lie beyond
+    the scene's duration. With a fixed step they must be whole multiples of it, to a millionth of it, and the run's `t`
+    holds those multiples. Without times, about 1000 over the scene's duration. settings: what the method can be given,
+    by name; None stands for the default.
 
     A method that chooses its steps ends one at each of the times, unless it is `dense` (of the bundled ones, `taylor`
     of the analytic engine). Where the times are closer together than the steps that its tolerance would allow, they
@@ -89,7 +90,7 @@ def plan(
     its = engine_of(engine) if isinstance(engine, str) else engine
     if flaw := flaw_of(its):
         raise InputError(f"engine is {show(engine)}, which is none ({flaw}); allowed: {', '.join(engine_names())}")
-    name = next(iter(its.methods)) if method is None else method
+    name = default_method(its, chosen, settings) if method is None else method
     if name not in its.methods:
         raise InputError(f"engine {its.name!r}: {choose('method', printable(str(name)), its.methods)}")
     numbers = _settings(name, its.methods[name], settings)

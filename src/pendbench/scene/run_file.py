@@ -56,7 +56,7 @@ def load_run(path: str | os.PathLike[str]) -> Trajectory:
     >>> file = os.path.join(tempfile.mkdtemp(), "run.npz")
     >>> pb.simulate("double", times=[0.0, 1.0]).save(file)
     >>> pb.load_run(file)
-    <Trajectory of 'double' by analytic adaptive: 2 samples of 2 links, 0 to 1 s, ok>
+    <Trajectory of 'double' by analytic taylor: 2 samples of 2 links, 0 to 1 s, ok>
 
     Raises InputError, one line, for a file that is damaged or was not written by `save`; nothing in it is run.
     """

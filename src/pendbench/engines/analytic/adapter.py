@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from typing import Final
 
 from pendbench import __version__
+from pendbench.engines.analytic.choice import cheapest
 from pendbench.engines.protocol import AdaptiveSimulation, Mapped, Method, Setting, Simulation, needed_step
 from pendbench.scene.scene import Scene
 from pendbench.solvers.methods import FixedStep, Form, fixed_step_methods
 
+_DEFAULT: Final = 1e-14
 _LIMITS: Final = {
-    "tolerance": Setting(1e-14, 1e-15, 1e-2, note="local error allowed per step: rad, and relative for rates"),
+    "tolerance": Setting(_DEFAULT, 1e-15, 1e-2, note="local error allowed per step: rad, and relative for rates"),
     "smallest_step": Setting(1e-12, 0.0, 1.0, note="s; a smaller step ends the run with status 'work limit'"),
     "most_steps": Setting(1e8, 1, 1e15, integer=True, note="more steps end the run with status 'work limit'"),
 }
@@ -58,6 +60,12 @@ class AnalyticEngine:
     name = "analytic"
     methods: Mapping[str, Method] = _METHODS
     effects: Mapping[str, Mapped] = _EFFECTS
+
+    def default_method(self, scene: Scene, settings: Mapping[str, float | None]) -> str:
+        """What is run where no method is named."""
+        given = settings.get("tolerance")
+        known = given is not None and _LIMITS["tolerance"].fits(given)
+        return cheapest(scene, given if known and given is not None else _DEFAULT)
 
     def version(self) -> str:
         """The project's own."""

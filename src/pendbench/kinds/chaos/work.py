@@ -108,7 +108,9 @@ def measure_neighbour(scene: Scene, truth: KeptTruth | None) -> Neighbour:
     """What chaos does to any small error in the very seconds of the scene."""
     if truth is None or not len(truth.t):
         return Neighbour("ok")
-    found = compare(scene, simulate(scene.with_start(scene.angles + _APART, scene.rates), times=truth.t), truth)
+    found = compare(
+        scene, simulate(scene.with_start(scene.angles + _APART, scene.rates), method="adaptive", times=truth.t), truth
+    )
     return Neighbour("ok", growth=growth_rate(found.t, found.error, _GROWTH_FROM, _GROWTH_TO))
 
 

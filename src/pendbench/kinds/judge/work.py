@@ -81,8 +81,8 @@ class Try:
 def measure_span(scene: Scene, asked: float | None) -> Span:
     """How long the scene is to be followed: as long as asked for; else to its end, or to where chaos has its say."""
     times = np.linspace(0.0, asked or scene.duration, _SAMPLES + 1)
-    run = simulate(scene, times=times)
-    beside = simulate(scene.with_start(scene.angles + _APART, scene.rates), times=times)
+    run = simulate(scene, method="adaptive", times=times)
+    beside = simulate(scene.with_start(scene.angles + _APART, scene.rates), method="adaptive", times=times)
     k = min(len(run.t), len(beside.t))
     if k < 2:
         return Span(run.status, run.reason)
