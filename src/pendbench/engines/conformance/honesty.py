@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from typing import Final
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.faults import STATUSES, Fault
-from pendbench.base.heard import heard
 from pendbench.base.strict import show
 from pendbench.engines.conformance.chains import (
     DT,
@@ -24,6 +22,7 @@ from pendbench.engines.conformance.chains import (
     same_bits,
 )
 from pendbench.engines.conformance.check import Reading, Subject, broken, check, kept
+from pendbench.engines.conformance.surroundings import surroundings_kept
 from pendbench.engines.conformance.truth import SAMPLES, truth
 from pendbench.engines.protocol import AdaptiveSimulation, Simulation, State
 from pendbench.physics.energy import energy, energy_scale
@@ -170,19 +169,9 @@ def forgets_its_past(its: Subject) -> Iterator[Reading]:
 @check(asks="Does it print nothing, and leave the working folder and numpy's error state as they were?")
 def leaves_the_process_alone(its: Subject) -> Iterator[Reading]:
     """While it is built, advances and is read."""
-    before, errors = os.getcwd(), np.geterr()
-    with heard() as said:
+    with surroundings_kept() as flaws:
         run = build(its, calm())
         forward(run, 5)
         run.state()
         run.health()
-    flaws = []
-    if os.getcwd() != before:
-        os.chdir(before)
-        flaws.append("it changes the working folder")
-    if np.geterr() != errors:
-        np.seterr(**errors)
-        flaws.append("it changes numpy's error state")
-    if said:
-        flaws.append(f"it prints {show(said[0][:60])}")
     yield from map(broken, flaws) if flaws else [kept()]

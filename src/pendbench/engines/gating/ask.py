@@ -8,13 +8,12 @@ import sys
 from dataclasses import dataclass
 from functools import cache
 
-import numpy as np
-
 from pendbench.base.errors import InputError, MissingEngineError, describe, printable
 from pendbench.base.heard import heard
 from pendbench.base.strict import show
 from pendbench.engines.conformance import CHECKS
 from pendbench.engines.conformance.check import Finding, Subject, findings
+from pendbench.engines.conformance.surroundings import surroundings_kept
 from pendbench.engines.protocol import Engine
 from pendbench.engines.registry import engine as engine_of
 from pendbench.engines.registry import flaw_of
@@ -37,16 +36,8 @@ class Description:
 def described(source: Source) -> Description:
     """What the engine is. Raises InputError for a name that is none, and nothing for what the engine does."""
     name = source if isinstance(source, str) else str(getattr(source, "name", type(source).__name__))
-    before, errors = os.getcwd(), np.geterr()
-    with heard() as said:
+    with surroundings_kept() as flaws:
         found = _described(source, name)
-    flaws = [f"it prints {show(said[0][:60])}"] if said else []
-    if os.getcwd() != before:
-        os.chdir(before)
-        flaws.append("it changes the working folder")
-    if np.geterr() != errors:
-        np.seterr(**errors)
-        flaws.append("it changes numpy's error state")
     if found.flaw or not flaws:
         return found
     return Description(found.name, found.version, found.methods, found.precision, f"loading it, {flaws[0]}")

@@ -12,7 +12,7 @@ from pendbench.base.faults import STATUSES, Fault
 from pendbench.kinds.chaos.work import THRESHOLDS, ChaosRun, KeptExponent, Neighbour
 from pendbench.measures.divergence import Crossing
 from pendbench.measures.orders import OrderFit
-from pendbench.report.names import OfRun
+from pendbench.report.names import OfRun, OfTruth
 from pendbench.scene.scene import Scene
 from pendbench.study.case import Case
 from pendbench.study.flags import of_steps, too_good
@@ -25,7 +25,7 @@ LEFT: Final = THRESHOLDS.index(1e-2)
 
 
 @dataclass(frozen=True, eq=False)
-class SceneRow:
+class SceneRow(OfTruth):
     """A scene, the truth of each of its starts (its own first), and what is known of its motion."""
 
     scene: Scene
@@ -34,19 +34,9 @@ class SceneRow:
     neighbour: Neighbour
 
     @property
-    def truth(self) -> KeptTruth:
+    def truth(self) -> KeptTruth:  # type: ignore[override]
         """The truth of the scene's own start."""
         return self.truths[0]
-
-    @property
-    def status(self) -> str:
-        """How that truth ended."""
-        return self.truth.status
-
-    @property
-    def reason(self) -> str:
-        """Why it ended where it did."""
-        return self.truth.reason
 
     @property
     def horizons(self) -> list[float]:
