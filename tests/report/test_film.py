@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import json
 import shutil
@@ -32,6 +33,15 @@ def test_a_strip_shows_each_run_in_its_colour():
     for colour in ([0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00]):
         assert (picture == colour).all(axis=-1).sum() > 100
     assert picture.shape[1] > 2 * picture.shape[0]
+
+
+def test_a_strip_does_not_name_what_an_engine_refuses():
+    stage = small_stage()
+    first, second, *rest = stage.acts
+    alone = dataclasses.replace(stage, acts=[first, dataclasses.replace(second, bodies=()), *rest])
+    picture = np.array(Image.open(io.BytesIO(strip(alone, 3))).convert("RGB"))
+    other = [int(second.colour[i : i + 2], 16) for i in (1, 3, 5)]
+    assert not (picture == other).all(axis=-1).any()
 
 
 def test_an_mp4_is_a_film_that_players_take(tmp_path):

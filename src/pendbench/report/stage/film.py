@@ -121,6 +121,7 @@ def _style() -> Iterator[None]:
 def _name_acts(figure: Figure, acts: Sequence[Act]) -> None:
     from matplotlib.lines import Line2D
 
+    acts = [act for act in acts if act.bodies]  # what an engine refuses is not seen
     handles = [Line2D([], [], color=act.colour, linewidth=3) for act in acts]
     names = [label(f"{act.name} {act.detail}", 44) for act in acts]
     figure.legend(handles, names, loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
