@@ -11,6 +11,7 @@ from markdown_it import MarkdownIt
 
 from pendbench.kinds.cost.columns import LongRow
 from pendbench.kinds.cost.long import verdict_of
+from pendbench.kinds.cost.page import facts
 from pendbench.kinds.cost.work import LongRun
 from pendbench.report.numbers import NOTHING
 from pendbench.report.page import Report
@@ -23,7 +24,7 @@ from pendbench.study.truths import KeptTruth
 from support import cost_data
 from support.cost_data import results, with_runs, with_timings
 from support.reading import PNG, cells_of, render, section
-from support.report_data import ENGINE, HOSTILE, NAN
+from support.report_data import ENGINE, HOSTILE, NAN, SCENE
 from support.scenes import chain
 
 HEADINGS = [
@@ -417,6 +418,48 @@ def test_noise_is_said_beside_the_number_it_spoils(tmp_path):
     noisy = with_timings(found, step_spread=0.4)
     assert f"other takes 50{TIMES} as long (noisy)." in answer(noisy)
     assert f"≤ 2 ms ? (50{TIMES})" in section(page_of(noisy, tmp_path), "The answer")
+
+
+@pytest.mark.parametrize("engine", ["ours", "other"])
+def test_a_ratio_is_noisy_where_either_of_its_numbers_is(engine):
+    found = results(scenes=("calm",), engines=("ours", "other"))
+    assert f"other takes 50{TIMES} as long (noisy)." in answer(retimed(found, engine, step_spread=0.4))
+
+
+def retimed(of, engine, dt=None, method=None, **change):
+    """The results with changes to the timings of an engine, or of its cases with that step and method alone."""
+    timings = {
+        case: replace(timing, **change)
+        if case.engine == engine and dt in (None, case.dt) and method in (None, case.method)
+        else timing
+        for case, timing in of.found.timings.items()
+    }
+    return replace(of, found=replace(of.found, timings=timings))
+
+
+def facts_of(of):
+    report = Report(of)
+    return facts(of, report.tables)
+
+
+def test_what_reading_costs_is_the_median_of_the_steps():
+    """Twice as much with rk4, three times with Euler's three steps; one that reads for 100 us is one of five."""
+    found = results(scenes=("calm",), engines=("other",), methods=("rk4", "euler"))
+    slow = retimed(found, "other", 1e-3, method="rk4", step_and_state_us=100.0)
+    assert facts_of(slow).dearer == [("other", 3.0)]
+
+
+def test_who_is_the_cheapest_in_most_scenes_is_named_first():
+    found = facts_of(results(engines=("ours", "other"), dear=100.0))
+    assert [(each.engine, each.scenes) for each in found.winners] == [("ours", ["a01", SCENE]), ("other", ["calm"])]
+
+
+def test_what_moves_is_the_cheapest_of_each_engine_that_is_accurate_enough():
+    """To 1e-4: our loosest tolerance, 40 us, and the other's rk4 with 10 ms, 2 ms; its Euler is cheaper and worse."""
+    shown = Report(results(scenes=("calm",), engines=("ours", "other"))).moving
+    assert [(case.engine, case.method, case.dt, case.settings) for case in shown] == [
+        ("ours", "adaptive", None, (("tolerance", 1e-4),)), ("other", "rk4", 1e-2, ())
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
