@@ -11,10 +11,12 @@ import pytest
 
 from pendbench.base.errors import InputError
 from pendbench.commands.run import run_study
-from pendbench.kinds.stability.columns import StepRow
+from pendbench.kinds.stability import page, work
+from pendbench.kinds.stability.columns import CaseRow, StepRow
 from pendbench.kinds.stability.plots import cell_text, growth_figure, map_figure
 from pendbench.kinds.stability.study import Found, measure
 from pendbench.kinds.stability.work import StabilityRun, measure_stability
+from pendbench.measures.energy import Balance
 from pendbench.measures.verdict import VERDICTS
 from pendbench.report.page import Report
 from pendbench.report.styles import Styles, engine_hue
@@ -148,6 +150,18 @@ def test_a_wrecking_ball_on_light_links_holds_at_a_240th_of_a_second():
     found = measure_stability(Case(scene, "analytic", "rk4", 4.166667e-3), 2.0)
     assert (found.verdict, found.steps) == ("holds", 479)
     assert found.energy_drift_max == pytest.approx(4.7e-8, rel=0.02)
+
+
+@pytest.mark.parametrize(("moved", "stays"), [([0.0, 0.05, 0.2, 0.4], 2.0), ([0.0, 0.05, 0.09, 0.02], 3.0)])
+def test_a_run_has_its_largest_energy_and_gap_and_stays_until_it_first_moved(monkeypatch, moved, stays):
+    scene, t = dataclasses.replace(load_scene("double"), rates=np.zeros(2)), np.arange(4.0)
+    theta = scene.angles + np.outer(moved, [0.5, -1.0])
+    run = Trajectory(t, theta, np.zeros((4, 2)), np.array([0.0, 0.3, 0.1, 0.2]), steps=3)
+    balance = Balance(t, np.array([0.0, -0.6, 0.4, 0.2]), 2.0, np.zeros(4))
+    monkeypatch.setattr(work, "follow", lambda *_: (run, balance))
+    monkeypatch.setattr(work, "accelerations", lambda *_: np.zeros(2))  # nothing pulls it
+    found = measure_stability(Case(scene, "mujoco", "rk4", 1.0), 3.0)
+    assert (found.energy_drift_max, found.gap_max, found.steps, found.stays_s) == (0.3, 0.3, 3, stays)
 
 
 def test_what_never_came_back_has_its_status_for_a_verdict():
@@ -386,6 +400,33 @@ def test_map_has_a_colour_and_a_word_for_every_verdict():
 )
 def test_cell(row, text):
     assert cell_text(row) == text
+
+
+def test_a_scene_s_best_step_is_bold_and_others_say_by_how_much_they_are_smaller():
+    best, half = step_row("holds", stable_dt_ratio=1.0), step_row("holds", stable_dt_ratio=0.25)
+    assert page._step(best) == "**0.1**"
+    assert page._step(half) == "0.1 (4\u00d7)"
+    assert page._step(step_row("holds", stable_dt_ratio=math.nan)) == "0.1"
+    assert page._step(dataclasses.replace(best, substeps=True)) == "0.1"  # whose steps are not those that it takes
+
+
+def case_row(engine, dt, verdict="holds", scene="double", **ran):
+    run = StabilityRun("ok", judged=verdict, **ran)
+    return CaseRow(Case(load_scene(scene), engine, "rk4", dt), run, 10.0, 0.1)
+
+
+def test_a_chain_that_stood_to_the_end_has_a_lower_bound():
+    assert page._stay(case_row("mujoco", 0.1, stays_s=10.0)) == "≥ 10 s"
+    assert page._stay(case_row("mujoco", 0.1, stays_s=6.0)) == "6 s"
+
+
+def test_what_moves_is_at_a_game_s_step_where_engines_fare_most_differently():
+    alike = [case_row(name, dt, scene="triple") for name in ("mujoco", "analytic", "pymunk") for dt in (0.05, 0.004)]
+    apart = [case_row("mujoco", dt) for dt in (0.05, 0.005, 0.0005)] + [case_row("analytic", 0.004, "breaks")]
+    shown = page.moving(None, {"cases": [*alike, *apart]})
+    assert [(case.scene.name, case.engine, case.dt) for case in shown] == [
+        ("double", "mujoco", 0.005), ("double", "analytic", 0.004)
+    ]  # fmt: skip
 
 
 def test_growth_has_the_engine_s_colour_and_hollow_marks_for_bounds():
