@@ -42,7 +42,7 @@ _FOR_LONG: Final = {"analytic": "frame"}
 _STEP_FOR_LONG_S: Final = 1 / 240
 #: A chain of more links is very long: no step is short enough for all of its motion, and nobody's truth reaches it.
 VERY_LONG: Final = 1000
-_FOR_VERY_LONG: Final = {"analytic": "bdf2"}  # moves well with half of a game's step: the study `scaling`
+_FOR_VERY_LONG: Final = {"analytic": "bdf2"}  # moves well, with twice this step already: docs/measuring.md
 _STEP_FOR_VERY_LONG_S: Final = 1 / 480
 #: The longest chain that an engine is asked for by default, where a longer one takes minutes or gigabytes.
 _LONGEST: Final = {"heyoka": LONG, "mujoco": VERY_LONG, "pymunk": VERY_LONG}
