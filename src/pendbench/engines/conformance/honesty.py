@@ -35,8 +35,9 @@ _FINE: Final = 0.01
 _RUNS: Final = 9
 _APART: Final = 1e-3
 _LEVELS: Final = (4, 5, 6)
-# Units in the last place. Measured: 3 to 300 for the bundled methods.
-_NOISE: Final = 1e4
+# Units in the last place. Measured in 200 seeds: 3 to 300 for most bundled methods, and up to 40,000 where velocities
+# are differences of positions, over a step of 10 ms, of rods that hold to some ten units.
+_NOISE: Final = 2e5
 
 
 @check(
@@ -112,7 +113,7 @@ def counts_its_steps(its: Subject) -> Iterator[Reading]:
 @check(
     asks="Does its state depend smoothly on its start, but for rounding?",
     unit="units in the last place",
-    limit_from="measured: 3 to 300 for the bundled methods; of adaptive ones what 1e-9 is, too",
+    limit_from="measured: 3 to 300, up to 40,000 of differences of positions over a step; of adaptive ones 1e-9, too",
     needs=("repeats itself",),
 )
 def is_smooth(its: Subject) -> Iterator[Reading]:
