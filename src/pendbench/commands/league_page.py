@@ -7,6 +7,7 @@ date as it is given, the versions and the machine.
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from itertools import groupby
@@ -16,6 +17,7 @@ from typing import Any, Final
 from pendbench.base.errors import InputError
 
 _BEGINS, _ENDS = "<!-- tables -->\n", "<!-- end of tables -->"
+_CHALLENGE: Final = re.compile(r"^### (\S+)\n\n((?:\|.*\n)+)", re.MULTILINE)
 _MACHINE: Final = (
     "processor",
     "logical processors",
@@ -40,6 +42,8 @@ def tables_of(folder: Path, date: str) -> str:
     parts = [f"{date}, {'the quick variant' if facts['quick'] else 'in full'}. All engines:", here]
     if "## Without our own engine" in report:
         parts += ["Without our own:", others[0]]
+    for scene, grid in _CHALLENGE.findall(report):
+        parts += [f"The Pendulum Challenge, scene `{scene}`:", grid]
     return "\n\n".join([*parts, *_sources(facts)]) + "\n"
 
 
