@@ -43,7 +43,7 @@ def tables_of(folder: Path, date: str) -> str:
     if "## Without our own engine" in report:
         parts += ["Without our own:", others[0]]
     for scene, grid in _CHALLENGE.findall(report):
-        parts += [f"The Pendulum Challenge, scene `{scene}`:", grid]
+        parts += [f"The Pendulum Challenge, scene `{scene}`:", grid.rstrip()]
     return "\n\n".join([*parts, *_sources(facts)]) + "\n"
 
 
