@@ -314,6 +314,25 @@ def test_wide_matrices_that_may_be_singular_prove_nothing():
         assert not all(x.is_finite() for x in found)
 
 
+def test_a_state_too_wide_to_be_seen_is_enclosed_again_with_more_bits(monkeypatch):
+    """Its rates come of a matrix that may be singular, where angles are known too little; flint raises then."""
+    scene, times, usual, asked = load_scene("double"), [0.0, 0.25], Momenta.motion, []
+
+    def motion(self, state):
+        asked.append(1)
+        if len(asked) == 2:
+            raise ZeroDivisionError("singular matrix in solve()")
+        return usual(self, state)
+
+    known = enclose(scene, times, form=Momenta)
+    monkeypatch.setattr(Momenta, "motion", motion)
+    found = enclose(scene, times, form=Momenta)
+    assert not found.reason
+    assert found.effort.bits > known.effort.bits
+    for a, b in zip(known.seen, found.seen, strict=True):
+        assert all(x.overlaps(y) for x, y in zip(a.theta + a.omega, b.theta + b.omega, strict=True))
+
+
 def test_a_box_keeps_its_own_edges_until_they_are_too_alike():
     """As they are, nothing is added to it: orthogonal ones make that of `heavy_tip` 3e5 times as large."""
     from pendbench.truth.proof.place import _frame

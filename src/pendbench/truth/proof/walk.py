@@ -68,7 +68,10 @@ class Walk:
         state = seen(self.place, path, bounds, u, self.effort)
         assert state is not None  # since the whole step is proved
         with precision(self.effort.bits):
-            return Seen(time, *self.system.motion(state))
+            try:
+                return Seen(time, *self.system.motion(state))
+            except ZeroDivisionError:  # of a state so wide the matrix may be singular
+                return Seen(time, [_anything()] * self.system.n, [_anything()] * self.system.n)
 
     def _prove(self, path: Path, reach: float, left: Number) -> tuple[Bounds, Place] | None:
         while True:
@@ -91,6 +94,13 @@ class Walk:
                 return bounds, place
             length = length / 2
         return None
+
+
+def _anything() -> Number:
+    """A ball that holds every number."""
+    from flint import arb
+
+    return arb(0.0, math.inf)
 
 
 def _convergence(path: Path) -> float:
