@@ -62,6 +62,9 @@ FAR_OFF = 3e-4
 #: How many steps are of order 1 after one of order 2 has no solution.
 CALMING = 6
 
+#: A step of a method that damps is not begun in more parts: where it needs that, nothing is gained by going on.
+MOST_TRIES = 200
+
 # What steps of order 1 begin with, and into how many halves one is cut at most where speeds are evened out.
 _PLAIN, _HALVES = (TURNING, RESTING, PULLED), 6
 
@@ -74,7 +77,7 @@ class _Run:
 
     def __init__(self, chain: Chain, state: State, member: int) -> None:
         self.chain, self.state, self.member = chain, state, member
-        self.far, self.missed = FAR_OFF * float(chain.lengths.sum()), math.inf
+        self.far, self.missed, self.rubbed = FAR_OFF * float(chain.lengths.sum()), math.inf, 0
 
     def closes(self, member: int, h: float, guesses: tuple[int, ...]) -> bool:
         """Whether a step of h (s) of that member does, from one of the guesses."""
@@ -117,8 +120,9 @@ class _Run:
     def frame(self, dt: float) -> bool:
         """Take a step of dt (s), in as many parts as it needs; False, and at its start, where that are too many."""
         left, kept, steps = FINEST, None, self.state.steps
-        self.missed = math.inf
+        self.missed, self.rubbed, tries = math.inf, 0, 0
         while left > 0:
+            tries += 1
             size = math.gcd(left, int(steps[2]))
             if kept is None and size < FINEST:
                 kept = self.keep()
@@ -126,12 +130,12 @@ class _Run:
             if longer is not None:
                 left -= size
                 steps[2] = min(FINEST, longer * size)
-            elif size > 1:
+            elif size > 1 and (tries < MOST_TRIES or self.member == CONSERVING):
                 kept = kept or self.keep()
                 steps[2] = size // 2
                 self.make_whole()
             else:
-                left = FINEST - self.smooth(dt, kept or self.keep())
+                left, tries = FINEST - self.smooth(dt, kept or self.keep()), 0
                 if left == FINEST:
                     return False
         return True
@@ -139,16 +143,17 @@ class _Run:
     def smooth(self, dt: float, before: Sequence[FloatArray]) -> int:
         """Begin a step of dt (s) again, with speeds evened out until a part of it closes: that part; 0 where none does.
 
-        No step resolves the crack of a whip of many links, where neighbours whirl round each other ever faster.
+        No step resolves the crack of a whip of many links, where neighbours whirl round each other ever faster. Asked
+        again in the same step, it evens out more.
         """
         mass = 1.0 / float(self.chain.couplings.max())
-        for power in range(len(self.state.q).bit_length() if self.member != CONSERVING else 0):
+        for power in range(self.rubbed, len(self.state.q).bit_length() if self.member != CONSERVING else 0):
             for size in (FINEST >> k for k in range(_HALVES)):
                 self.go_back(before)
                 rub(self.chain, self.state, mass * 4.0**power)
                 if self.closes(EULER, dt * size / FINEST, _PLAIN):
                     accept(self.chain, self.state, EULER, dt * size / FINEST)
-                    self.state.steps[2:] = size, CALMING
+                    self.state.steps[2:], self.rubbed = (size, CALMING), power + 1
                     return size
         self.go_back(before)
         return 0
