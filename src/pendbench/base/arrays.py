@@ -15,6 +15,11 @@ def no_numbers() -> FloatArray:
     return np.zeros(0)
 
 
+def no_rows() -> FloatArray:
+    """A table without rows, (0, 0)."""
+    return np.zeros((0, 0))
+
+
 def largest(values: FloatArray) -> float:
     """The largest of some numbers; nan where there are none."""
     return float(values.max()) if len(values) else math.nan

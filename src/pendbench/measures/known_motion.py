@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendbench.base.arrays import FloatArray, no_numbers
+from pendbench.base.arrays import FloatArray, no_numbers, no_rows
 from pendbench.engines.protocol import refusal
 from pendbench.engines.recording import fault_of
 from pendbench.engines.registry import engine
@@ -26,10 +26,6 @@ _TOLERANCES: Final = (1e-9, 1e-8)  # of the motion, and from the turned start: a
 _FINER: Final = (8, 4)
 
 
-def _no_rows() -> FloatArray:
-    return np.zeros((0, 0))
-
-
 @dataclass(frozen=True, eq=False)
 class Known:
     """A motion at the multiples of an interval, from 0 on; status and reason where something went wrong.
@@ -40,9 +36,9 @@ class Known:
 
     status: str
     reason: str = ""
-    angles: FloatArray = field(default_factory=_no_rows)
-    centre: FloatArray = field(default_factory=_no_rows)
-    tip: FloatArray = field(default_factory=_no_rows)
+    angles: FloatArray = field(default_factory=no_rows)
+    centre: FloatArray = field(default_factory=no_rows)
+    tip: FloatArray = field(default_factory=no_rows)
     lowest: FloatArray = field(default_factory=no_numbers)
 
     @property

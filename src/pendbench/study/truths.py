@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendbench.base.arrays import FloatArray, no_numbers
+from pendbench.base.arrays import FloatArray, no_numbers, no_rows
 from pendbench.base.errors import InputError
 from pendbench.physics.geometry import distance, wrapped
 from pendbench.scene.scene import Scene
@@ -20,10 +20,6 @@ from pendbench.truth.reference import reference_within
 _TELLING: Final = 16
 #: A chain none of whose angles gets farther from its start than this, rad, does not move.
 _STILL: Final = 1e-12
-
-
-def _no_states() -> FloatArray:
-    return np.zeros((0, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +35,9 @@ class KeptTruth:
     horizon: float = math.nan
     error: float = math.nan
     t: FloatArray = field(default_factory=no_numbers)
-    theta: FloatArray = field(default_factory=_no_states)
-    theta_low: FloatArray = field(default_factory=_no_states)
-    omega: FloatArray = field(default_factory=_no_states)
+    theta: FloatArray = field(default_factory=no_rows)
+    theta_low: FloatArray = field(default_factory=no_rows)
+    omega: FloatArray = field(default_factory=no_rows)
     bound: FloatArray = field(default_factory=no_numbers)
 
     @property
