@@ -25,7 +25,7 @@ def assert_same(found, expected, tolerance):
 
 
 @pytest.mark.parametrize("gravity", [GRAVITY, None])
-@pytest.mark.parametrize("n", [1, 2, 3, 10, 30])
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 9, 10, 11, 30])
 def test_dense_form_agrees(n, gravity):
     for seed in range(5):
         scene = random_chain(n, seed, spread=4.0, gravity=gravity)

@@ -23,17 +23,6 @@ class Tableau(NamedTuple):
 
 
 @inlined
-def stage_state(a: FloatArray, row: int, h: float, y: FloatArray, k: FloatArray, out: FloatArray) -> None:
-    """Write `y + h sum_j a[row, j] k[j]` over the stages before `row` into `out`."""
-    copy(y, out)
-    for j in range(row):
-        weight = h * a[row, j]
-        if weight != 0.0:
-            for i in range(len(y)):
-                out[i] += weight * k[j, i]
-
-
-@inlined
 def add_stages(weights: FloatArray, stages: int, h: float, k: FloatArray, out: FloatArray) -> None:
     """Add `h sum_j weights[j] k[j]` over the first `stages` stages to `out`, four at a time: each pass costs memory."""
     together = stages - stages % 4
@@ -46,6 +35,13 @@ def add_stages(weights: FloatArray, stages: int, h: float, k: FloatArray, out: F
         if weight != 0.0:
             for i in range(len(out)):
                 out[i] += weight * k[j, i]
+
+
+@inlined
+def stage_state(a: FloatArray, row: int, h: float, y: FloatArray, k: FloatArray, out: FloatArray) -> None:
+    """Write `y + h sum_j a[row, j] k[j]` over the stages before `row` into `out`."""
+    copy(y, out)
+    add_stages(a[row], row, h, k, out)
 
 
 @compiled

@@ -1,7 +1,7 @@
-"""The accelerations of a chain on massless rods in O(n), from tip to pivot and back.
+"""The accelerations of a chain on massless rods on whose masses forces act, in O(n), from tip to pivot and back.
 
-Under gravity it is free of cancellation. docs/equations.md derives it, and docs/effects.md says what other effects cost
-in digits.
+docs/equations.md derives it, and docs/effects.md says what effects cost in digits. Where only weight acts on the
+masses, `both_ends` needs less time.
 """
 
 from __future__ import annotations
@@ -36,31 +36,28 @@ def inwards(system: System, t: float, theta: FloatArray, omega: FloatArray) -> t
     `T_{i+1} = own_i + passed_i T_i`, and `across_i = sin / m_i`, with which T_{i+1} turns into the acceleration of mass
     i across rod i. Returns (alpha_1, beta_1), with which the tension in the first rod is `beta - alpha u.a'`.
 
-    Where forces act on the masses, T is what is left of a rod's tension without the force along it on its own mass,
-    and `held_i / m_i` the acceleration across the rod but for T_i (docs/equations.md, (E44)).
+    T is what is left of a rod's tension without the force along it on its own mass, and `held_i / m_i` the acceleration
+    across the rod but for T_i (docs/equations.md, (E44)).
     """
     masses, lengths, ratios = system.masses, system.lengths, system.ratios
     scratch = system.scratch
-    forced = len(system.joints) + len(system.drags) > 0
     write_bends(theta, scratch, COSINE, ACROSS)
     tip = len(masses) - 1
     # (E31): each link's division would have to wait for that of the link before it, so none is made until the end.
     whole, loose, moving = 1.0, 1.0, lengths[tip] * omega[tip] ** 2
-    if forced:
-        forces.write_forces(system, t, theta, omega, COSINE, ACROSS)
-        scratch[HELD, tip] = scratch[FORCE_ACROSS, tip]
+    forces.write_forces(system, t, theta, omega, COSINE, ACROSS)
+    scratch[HELD, tip] = scratch[FORCE_ACROSS, tip]
     for last in range(tip, 0, -_LINKS_BETWEEN):
         for i in range(last - 1, max(last - _LINKS_BETWEEN, 0) - 1, -1):
             c, s = scratch[COSINE, i], scratch[ACROSS, i]
             scratch[OWN, i], scratch[PASSED, i] = masses[i] * moving, c * whole
             scratch[ACROSS, i] = s * system.inverse_masses[i]
             heavier = ratios[i] * loose
-            if forced:
-                outer, across = scratch[FORCE_ALONG, i + 1], scratch[FORCE_ACROSS, i]
-                scratch[HELD, i] = s * (scratch[OWN, i] + heavier * outer) + across * (c * c * whole + heavier)
-                scratch[OWN, i] -= whole * (outer + s * across)
-                moving = moving + outer * loose * system.inverse_masses[i + 1]
-                moving = moving - s * whole * across * system.inverse_masses[i]
+            outer, across = scratch[FORCE_ALONG, i + 1], scratch[FORCE_ACROSS, i]
+            scratch[HELD, i] = s * (scratch[OWN, i] + heavier * outer) + across * (c * c * whole + heavier)
+            scratch[OWN, i] -= whole * (outer + s * across)
+            moving = moving + outer * loose * system.inverse_masses[i + 1]
+            moving = moving - s * whole * across * system.inverse_masses[i]
             loose = heavier + s * s * whole
             whole = whole + heavier
             moving = c * moving + lengths[i] * omega[i] ** 2 * whole
@@ -72,8 +69,7 @@ def inwards(system: System, t: float, theta: FloatArray, omega: FloatArray) -> t
         share = 1.0 / scratch[WHOLE, i]
         scratch[OWN, i] *= share
         scratch[PASSED, i] *= share
-        if forced:
-            scratch[HELD, i] *= share
+        scratch[HELD, i] *= share
     scratch[OWN, tip], scratch[PASSED, tip], scratch[ACROSS, tip] = 0.0, 0.0, 0.0
     jerked = masses[0] / loose
     return jerked * whole, jerked * moving
@@ -87,7 +83,6 @@ def outwards(system: System, t: float, theta: FloatArray, alpha: float, beta: fl
     positive weights (but for the cosine), so a light mass between heavy ones costs no digits.
     """
     lengths, scratch = system.lengths, system.scratch
-    forced = len(system.joints) + len(system.drags) > 0
     c, s = direction(theta[0])
     tension = beta + alpha * system.gravity * c
     start = system.gravity * s  # how the inner end of the rod accelerates across it
@@ -99,14 +94,10 @@ def outwards(system: System, t: float, theta: FloatArray, alpha: float, beta: fl
         c = scratch[COSINE, i]
         scratch[TENSION, i] = tension
         following = scratch[OWN, i] + scratch[PASSED, i] * tension
-        if forced:
-            inverse = system.inverse_masses[i]
-            end = scratch[HELD, i] * inverse + scratch[ACROSS, i] * (scratch[PASSED, i] * tension)
-            out[i] = (end - start) / lengths[i]
-            start = scratch[ACROSS, i] * tension + c * scratch[FORCE_ACROSS, i] * inverse
-        else:
-            out[i] = (scratch[ACROSS, i] * following - start) / lengths[i]
-            start = scratch[ACROSS, i] * tension
+        inverse = system.inverse_masses[i]
+        end = scratch[HELD, i] * inverse + scratch[ACROSS, i] * (scratch[PASSED, i] * tension)
+        out[i] = (end - start) / lengths[i]
+        start = scratch[ACROSS, i] * tension + c * scratch[FORCE_ACROSS, i] * inverse
         tension = following
 
 

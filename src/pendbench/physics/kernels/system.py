@@ -18,16 +18,17 @@ from pendbench.scene.scene import Scene
 class System(NamedTuple):
     """A chain on massless rods.
 
-    masses (n,) kg; lengths (n,) m; ratios (n - 1,) of each mass to the next; gravity m/s^2 (0 where the scene has none:
-    it enters once, at the pivot, and costs the same). pivots, joints, drags: the terms that move the pivot, act in the
-    joints and on the masses, mostly (). scratch (rows, n): room for the recursion, so that a call allocates nothing.
-    One thread, one system.
+    masses (n,) kg; lengths (n,) m; ratios (n - 1,) of each mass to the next, inner_ratios (n,) to the one before, 0 for
+    the first; gravity m/s^2 (0 where the scene has none: it enters once, at the pivot, and costs the same). pivots,
+    joints, drags: the terms that move the pivot, act in the joints and on the masses, mostly (). scratch (rows, n):
+    room for the recursion, so that a call allocates nothing. One thread, one system.
     """
 
     masses: FloatArray
     lengths: FloatArray
     inverse_masses: FloatArray
     ratios: FloatArray
+    inner_ratios: FloatArray
     gravity: float
     pivots: Any
     joints: Any
@@ -88,7 +89,8 @@ def system_of(scene: Scene) -> System | LinkSystem | RotorSystem:
         masses=np.array(scene.masses),
         lengths=np.array(scene.lengths),
         inverse_masses=1.0 / scene.masses,
-        ratios=scene.masses[:-1] / scene.masses[1:],
+        ratios=np.append(scene.masses[:-1] / scene.masses[1:], 0.0),
+        inner_ratios=np.append(0.0, scene.masses[1:] / scene.masses[:-1]),
         scratch=scratch,
         **effects,
     )

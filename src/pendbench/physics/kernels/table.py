@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import compiled, inlined, specialise
-from pendbench.physics.kernels import canonical, ensemble, massive, massless, rotors, series
+from pendbench.physics.kernels import both_ends, canonical, ensemble, massive, massless, rotors, series
 from pendbench.physics.kernels.ensemble import EnsembleSystem, ensemble_system_of
 from pendbench.physics.kernels.series import SeriesSystem, series_system_of
 from pendbench.physics.kernels.system import LinkSystem, RotorSystem, System, system_of
@@ -28,10 +28,19 @@ def _write_derivative(system: Any, t: float, y: FloatArray, dy: FloatArray) -> N
     problem.acceleration(system, t, y[:n], y[n:], dy[n:])
 
 
+@inlined
+def _write_massless(system: System, t: float, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
+    """Write the accelerations of a chain on massless rods; which way is known while compiling."""
+    if len(system.joints) + len(system.drags) > 0:
+        massless.write_accelerations(system, t, theta, omega, out)
+    else:
+        both_ends.write_accelerations(system, t, theta, omega, out)
+
+
 TABLE: Final[Mapping[type, Mapping[Callable[..., None], Callable[..., None]]]] = {
     System: {
         problem.derivative: _write_derivative,
-        problem.acceleration: massless.write_accelerations,
+        problem.acceleration: _write_massless,
         problem.momentum: canonical.write_momenta,
         problem.velocity: canonical.write_rates,
         problem.generalized_force: canonical.write_forces,
