@@ -8,7 +8,9 @@ from numpy.polynomial import polynomial
 
 from pendbench.physics.exact import single_pendulum
 from pendbench.physics.kernels.recursion import accelerations
-from pendbench.physics.kernels.series import series_system_of, write_rate_series
+from pendbench.physics.kernels.series import chain_series_of
+from pendbench.physics.kernels.table import series_system_of
+from pendbench.solvers import problem
 from support.hard_chains import HARD, exact_accelerations, hard_chains, relative_error
 from support.kernels import called
 from support.scenes import chain, random_chain
@@ -18,7 +20,7 @@ def rate_series(scene, order, system=None):
     """The Taylor coefficients (order + 1, n) of the rates at the scene's start."""
     omega = np.full((order + 1, scene.n), np.nan)
     omega[0] = scene.rates
-    called(write_rate_series)(system or series_system_of(scene, order), 0.0, scene.angles, omega)
+    called(problem.rate_series)(system or series_system_of(scene, order), 0.0, scene.angles, omega)
     return omega
 
 
@@ -110,5 +112,5 @@ def test_room_that_has_been_used_before_leaves_no_trace():
     scene, other = (random_chain(4, seed, spread=3.0) for seed in (1, 2))
     system = series_system_of(scene, 9)
     first = rate_series(scene, 9, system)
-    called(write_rate_series)(system, 0.0, other.angles, np.vstack([other.rates, np.zeros((9, 4))]))
+    called(problem.rate_series)(system, 0.0, other.angles, np.vstack([other.rates, np.zeros((9, 4))]))
     np.testing.assert_array_equal(rate_series(scene, 9, system), first)

@@ -11,7 +11,7 @@ import pendbench as pb
 from pendbench.engines.analytic.adapter import AnalyticEngine
 from pendbench.physics.exact import single_pendulum
 from pendbench.physics.geometry import distance
-from pendbench.physics.kernels.series import series_system_of
+from pendbench.physics.kernels.table import series_system_of
 from pendbench.scene.scene import load_scene
 from pendbench.solvers.control import Limits
 from pendbench.solvers.outcome import DONE, NOT_FINITE, TOO_MANY, TOO_SMALL

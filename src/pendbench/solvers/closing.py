@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pendbench.base.arrays import FloatArray
-from pendbench.base.compiled import compiled, inlined
+from pendbench.base.compiled import compiled, inlined, part
 from pendbench.solvers.trigonometry import write_directions
 
 _MOST_ITERATIONS = 12
@@ -135,7 +135,7 @@ def _substitute(
     return x, y, (worst if size <= worst else size)  # nan is kept
 
 
-@inlined
+@part
 def _iterate(chain: Chain, room: Room, angles: FloatArray, share: float) -> float:
     """One of Newton's steps; returns the largest change of an angle, rad."""
     couplings, n = chain.couplings, len(angles)
@@ -167,15 +167,18 @@ def close(chain: Chain, room: Room, angles: FloatArray, share: float, tolerance:
     """Find the angles and pulls that close the chain, from the guess in `room`; False where they are not found.
 
     angles (n,) rad: those before the step. share: w above. Ends with a change of the angles of at most `tolerance`
-    (rad), so what is left is of the order of its square. A rod that went round more often than its guess is turned
+    (rad), and of the square of the largest turn that the guess has: what is left is of the order of the change's
+    square, and a formula of order 2 leaves that turn's cube. A rod that went round more often than its guess is turned
     back: a direction says nothing of full turns, the motion does. Leaves the rods in `room`.
     """
-    rows, n, before = room.rows, len(angles), np.inf
+    rows, n, before, turn = room.rows, len(angles), np.inf, 0.0
     for i in range(n):
         rows[GUESS, i] = rows[ANGLE, i]
+        turn = max(turn, abs(rows[ANGLE, i] - angles[i]))
+    enough = min(tolerance, turn * turn)
     for count in range(_MOST_ITERATIONS):
         worst = _iterate(chain, room, angles, share)
-        if worst <= tolerance or before <= worst < _ROUNDING:
+        if worst <= enough or before <= worst < _ROUNDING:
             break
         if not worst < _LOST or (count > 2 and worst > before):
             return False

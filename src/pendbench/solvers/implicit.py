@@ -69,7 +69,7 @@ MOST_TRIES = 200
 _PLAIN, _HALVES = (TURNING, RESTING, PULLED), 6
 
 # Changes of angles, rad, that end Newton's method: what is left is of the order of their square.
-_CLOSE, _EXACT = 1e-4, 1e-9
+_CLOSE, _EXACT = 3e-3, 1e-9
 
 
 class _Run:

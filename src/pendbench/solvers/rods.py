@@ -106,21 +106,39 @@ def _solve_rods(chain: Chain, rows: FloatArray, n: int) -> None:
 
     The change of rod i is a_i f_i - c_(i+1) f_(i+1) - c_i f_(i-1), with f along the rods.
     """
-    couplings = chain.couplings
-    rows[PULL, 0] = 1.0 / couplings[1]
+    couplings, middle = chain.couplings, n // 2
     for i in range(1, n):
-        beside = -couplings[i] * (rows[ROD_X, i] * rows[ROD_X, i - 1] + rows[ROD_Y, i] * rows[ROD_Y, i - 1])
-        ratio = beside * rows[PULL, i - 1]
-        rows[PULL, i] = 1.0 / (couplings[i] + couplings[i + 1] - ratio * beside)
-        rows[SPARE, i] -= ratio * rows[SPARE, i - 1]
-    rows[SPARE, n - 1] *= rows[PULL, n - 1]
-    for i in range(n - 2, -1, -1):
-        beside = -couplings[i + 1] * (rows[ROD_X, i] * rows[ROD_X, i + 1] + rows[ROD_Y, i] * rows[ROD_Y, i + 1])
-        rows[SPARE, i] = (rows[SPARE, i] - beside * rows[SPARE, i + 1]) * rows[PULL, i]
+        beside = rows[ROD_X, i] * rows[ROD_X, i - 1] + rows[ROD_Y, i] * rows[ROD_Y, i - 1]
+        rows[FORCE_X, i], rows[FORCE_Y, i] = -couplings[i] * beside, couplings[i] + couplings[i + 1]
+    rows[FORCE_X, 0], rows[FORCE_X, n], rows[FORCE_Y, 0] = 0.0, 0.0, couplings[1]
+    before, after, pull, pull_after = 0.0, 0.0, 0.0, 0.0
+    for k in range(middle):  # from both ends: while one waits for a division, the other goes on
+        ratio = rows[FORCE_X, k] * before
+        before, pull = 1.0 / (rows[FORCE_Y, k] - ratio * rows[FORCE_X, k]), rows[SPARE, k] - ratio * pull
+        rows[PULL, k], rows[SPARE, k] = before, pull
+        i = n - 1 - k
+        if i > middle:
+            ratio = rows[FORCE_X, i + 1] * after
+            after = 1.0 / (rows[FORCE_Y, i] - ratio * rows[FORCE_X, i + 1])
+            pull_after = rows[SPARE, i] - ratio * pull_after
+            rows[PULL, i], rows[SPARE, i] = after, pull_after
+    inner, outer = rows[FORCE_X, middle], rows[FORCE_X, middle + 1]
+    pull = rows[SPARE, middle] - inner * before * pull - outer * after * pull_after
+    pull /= rows[FORCE_Y, middle] - inner * inner * before - outer * outer * after
+    rows[SPARE, middle], pull_after = pull, pull
+    for k in range(middle):
+        i = middle - 1 - k
+        pull = (rows[SPARE, i] - rows[FORCE_X, i + 1] * pull) * rows[PULL, i]
+        rows[SPARE, i] = pull
+        i = middle + 1 + k
+        if i < n:
+            pull_after = (rows[SPARE, i] - rows[FORCE_X, i] * pull_after) * rows[PULL, i]
+            rows[SPARE, i] = pull_after
     for i in range(n):
         rows[FORCE_X, i + 1] = rows[SPARE, i] * rows[ROD_X, i]
         rows[FORCE_Y, i + 1] = rows[SPARE, i] * rows[ROD_Y, i]
-    rows[FORCE_X, n + 1], rows[FORCE_Y, n + 1] = 0.0, 0.0
+    for i in (0, n + 1):
+        rows[FORCE_X, i], rows[FORCE_Y, i] = 0.0, 0.0
 
 
 @inlined

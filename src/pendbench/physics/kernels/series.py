@@ -12,7 +12,6 @@ import numpy as np
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import inlined
-from pendbench.physics.acting import check_plain
 from pendbench.scene.scene import Scene
 from pendbench.solvers.convolution import convolution, factors
 from pendbench.solvers.trigonometry import direction, rounded_bend
@@ -49,12 +48,8 @@ class SeriesSystem(NamedTuple):
     end_sums: FloatArray
 
 
-def series_system_of(scene: Scene, order: int) -> SeriesSystem:
-    """The scene's chain and effects, with room for series of that order.
-
-    Raises InputError where more than gravity acts.
-    """
-    check_plain(scene, "the Taylor series")
+def chain_series_of(scene: Scene, order: int) -> SeriesSystem:
+    """The scene's chain under gravity or free of it, with room for series of that order."""
     masses, gravity = np.array(scene.masses), scene.effects.gravity
     joints = scene.n - 1
     return SeriesSystem(

@@ -10,10 +10,13 @@ from typing import Any, Final
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import compiled, inlined, specialise
-from pendbench.physics.kernels import both_ends, canonical, ensemble, massive, massless, rotors, series
+from pendbench.physics.acting import check_plain
+from pendbench.physics.kernels import both_ends, canonical, ensemble, massive, massless, rotors, series, single
 from pendbench.physics.kernels.ensemble import EnsembleSystem, ensemble_system_of
-from pendbench.physics.kernels.series import SeriesSystem, series_system_of
+from pendbench.physics.kernels.series import SeriesSystem, chain_series_of
+from pendbench.physics.kernels.single import SingleSystem, single_system_of
 from pendbench.physics.kernels.system import LinkSystem, RotorSystem, System, system_of
+from pendbench.scene.scene import Scene
 from pendbench.solvers import problem
 from pendbench.solvers.copying import copy
 
@@ -61,11 +64,18 @@ TABLE: Final[Mapping[type, Mapping[Callable[..., None], Callable[..., None]]]] =
     },
     EnsembleSystem: {problem.ensemble_derivatives: ensemble.write_derivatives},
     SeriesSystem: {problem.rate_series: series.write_rate_series},
+    SingleSystem: {problem.rate_series: single.write_rate_series},
 }
 
 for _system, _kernels in TABLE.items():
     for _asked, _kernel in _kernels.items():
         specialise(_asked, _system, _kernel)
+
+
+def series_system_of(scene: Scene, order: int) -> SeriesSystem | SingleSystem:
+    """The scene's chain, with room for series of that order. Raises InputError where more than gravity acts."""
+    check_plain(scene, "the Taylor series")
+    return single_system_of(scene, order) if scene.n == 1 else chain_series_of(scene, order)
 
 
 @compiled
