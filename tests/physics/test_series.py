@@ -8,7 +8,6 @@ from numpy.polynomial import polynomial
 
 from pendbench.physics.exact import single_pendulum
 from pendbench.physics.kernels.recursion import accelerations
-from pendbench.physics.kernels.series import chain_series_of
 from pendbench.physics.kernels.table import series_system_of
 from pendbench.solvers import problem
 from support.hard_chains import HARD, exact_accelerations, hard_chains, relative_error
