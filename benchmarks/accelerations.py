@@ -31,7 +31,7 @@ from pendbench.engines.mujoco.mjcf import alone, compile_chain, joint_values
 from pendbench.physics import dense
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import distance
-from pendbench.physics.kernels.massless import write_accelerations
+from pendbench.physics.kernels.both_ends import write_accelerations
 from pendbench.physics.kernels.recursion import accelerations, system_of
 from pendbench.physics.kernels.system import System
 from pendbench.scene.scene import Scene

@@ -1,7 +1,7 @@
 """Where the time of the accelerations goes, and what many chains at once cost. By hand: python benchmarks/profile.py
 
-Two tables in Markdown. The first takes one chain's recursion apart: sines and cosines of the bends, the elimination
-inwards, the tensions outwards. The second runs many chains in vector registers, on one thread and on two.
+Two tables in Markdown. The first takes one chain's recursion apart: sines and cosines of the bends, the tensions
+from both ends, and what follows from them. The second runs many chains in vector registers, on one thread and on two.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import Any, Final
 import numpy as np
 
 from pendbench.base.compiled import compiled_for_threads
+from pendbench.physics.kernels.both_ends import write_accelerations, write_tensions
 from pendbench.physics.kernels.ensemble import write_ensemble_accelerations
-from pendbench.physics.kernels.massless import inwards, write_accelerations
-from pendbench.physics.kernels.scratch import COSINE, SINE
+from pendbench.physics.kernels.scratch import ACROSS, COSINE, SINE
 from pendbench.physics.kernels.table import ensemble_system_of, system_of
 from pendbench.scene.scene import Effects, Scene
 from pendbench.solvers.trigonometry import write_bends
@@ -39,11 +39,13 @@ def bends(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:  #
 
 
 @compiled_for_threads
-def elimination(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:
-    """Sines and cosines, and the way inwards."""
+def tensions(system: Any, theta: Any, omega: Any, out: Any, times: int) -> None:  # noqa: ARG001
+    """Sines and cosines, and the tensions."""
+    tip = len(theta) - 1
     for _ in range(times):
-        alpha, beta = inwards(system, 0.0, theta, omega)
-        out[0] = alpha + beta
+        write_bends(theta, system.scratch, COSINE, SINE)
+        system.scratch[COSINE, tip], system.scratch[ACROSS, tip] = 0.0, 1.0
+        write_tensions(system, omega, 1.0)
         theta[0] += 1e-12
 
 
@@ -82,10 +84,10 @@ def per_link(call: Callable[[int], None], links: float) -> float:
 
 
 def phases(n: int) -> list[float]:
-    """For each link, ns: bends, the rest of the way inwards, the way outwards, all."""
+    """For each link, ns: bends, tensions, what follows from them, all."""
     scene = chain(n)
     arguments = (system_of(scene), scene.angles.copy(), scene.rates.copy(), np.zeros(n))
-    first, second, third = (per_link(lambda times, f=f: f(*arguments, times), n) for f in (bends, elimination, whole))
+    first, second, third = (per_link(lambda times, f=f: f(*arguments, times), n) for f in (bends, tensions, whole))
     return [first, second - first, third - second, third]
 
 
@@ -111,7 +113,7 @@ def many(n: int) -> tuple[float, float]:
 def main() -> None:
     """Print the tables."""
     print(f"{os.cpu_count()} processors; load {os.getloadavg()[0]:.1f}; ns for each link, medians of {REPEATS}.\n")
-    print("| n | sines and cosines | inwards | outwards | all |\n| ---: | ---: | ---: | ---: | ---: |")
+    print("| n | sines and cosines | tensions | accelerations | all |\n| ---: | ---: | ---: | ---: | ---: |")
     for n in SIZES:
         print(f"| {n} | " + " | ".join(f"{value:.2f}" for value in phases(n)) + " |", flush=True)
     print(

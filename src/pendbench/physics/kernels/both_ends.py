@@ -36,7 +36,7 @@ def _reduced(whole: float, loose: float, moving: float) -> tuple[float, float, f
 
 
 @inlined
-def _write_tensions(system: System, omega: FloatArray, moving: float) -> None:
+def write_tensions(system: System, omega: FloatArray, moving: float) -> None:
     """Leave T (n,) in the scratch; moving: how the first mass would accelerate along its rod without rods, m/s^2.
 
     Nothing here returns early or asks whether there are joints: numba would then count references at every call.
@@ -100,7 +100,7 @@ def write_accelerations(system: System, t: float, theta: FloatArray, omega: Floa
     if len(system.pivots) > 0:
         x, y = laws.pivot_acceleration(system.pivots, t)
         along, start = along + (c * y - s * x), start + (c * x + s * y)
-    _write_tensions(system, omega, along + lengths[0] * omega[0] ** 2)
+    write_tensions(system, omega, along + lengths[0] * omega[0] ** 2)
     out[tip] = -start / lengths[tip]
     for i in range(min(tip, 1)):
         out[i] = (scratch[ACROSS, i] * scratch[TENSION, i + 1] - start) / lengths[i]
