@@ -29,10 +29,13 @@ from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import compiled, inlined, part
 from pendbench.solvers.trigonometry import write_directions
 
-_MOST_ITERATIONS = 12
+_MOST_ITERATIONS, _MOST_DESCENTS = 12, 200
 #: A change of angle, rad, that no iteration recovers from; and one so small that, where it no longer falls, digits end.
 _LOST, _ROUNDING = 30.0, 1e-7
 TURN = 2.0 * np.pi
+
+# Of a descent, the largest change of an angle, rad: what ends it, what is little, and what is far.
+_NEAR, _SMALL, _FAR = 1e-2, 0.5, 2.0
 
 # The rows of `Room.rows`: see there.
 WANTED_X, WANTED_Y, ANGLE, PULL, ROD_Y, ROD_X, ALONG_Y, ALONG_X, FORCE_X, FORCE_Y, SPARE, GUESS = range(12)
@@ -189,3 +192,59 @@ def close(chain: Chain, room: Room, angles: FloatArray, share: float, tolerance:
         rows[ANGLE, i] -= TURN * np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
     write_rods(rows[ANGLE, :n], rows, ROD_Y)
     return True
+
+
+@part
+def _misfit(chain: Chain, rows: FloatArray, n: int) -> float:
+    """How far the masses are from where they would be without pulls: half the sum of m d^2, kg m^2; d in FORCE."""
+    write_rods(rows[ANGLE, :n], rows, ROD_Y)
+    x, y, total = 0.0, 0.0, 0.0
+    for i in range(n):
+        x += chain.lengths[i] * rows[ROD_X, i] - rows[WANTED_X, i]
+        y += chain.lengths[i] * rows[ROD_Y, i] - rows[WANTED_Y, i]
+        rows[FORCE_X, i + 1], rows[FORCE_Y, i + 1] = x, y
+        total += (x * x + y * y) / chain.couplings[i + 1]
+    return 0.5 * total
+
+
+@inlined
+def _write_tensions(chain: Chain, rows: FloatArray, n: int) -> None:
+    """The pulls that the misfit asks for along the rods, where they are tensions: these make the descent convex."""
+    x, y = 0.0, 0.0
+    for i in range(n - 1, -1, -1):
+        x -= rows[FORCE_X, i + 1] / chain.couplings[i + 1]
+        y -= rows[FORCE_Y, i + 1] / chain.couplings[i + 1]
+        rows[PULL, i] = max(0.0, x * rows[ROD_X, i] + y * rows[ROD_Y, i])
+
+
+@compiled
+def descend(chain: Chain, room: Room, angles: FloatArray) -> None:
+    """From any guess in `room`, for w = 1, go to where the chain closes, near enough for `close`. angles (n,) rad.
+
+    What closes is where the masses are nearest to where they would be without pulls (`_misfit`), and that is somewhere.
+    Newton's step is shortened by a pull that is added to all rods, the larger the worse it went (Levenberg and
+    Marquardt; Nocedal and Wright, Numerical Optimization, 10.3): it falls while rods turn little and rises while they
+    turn far.
+    """
+    rows, n = room.rows, len(angles)
+    for i in range(n):
+        rows[GUESS, i] = rows[ANGLE, i]
+    energy = _misfit(chain, rows, n)
+    added = energy / chain.lengths.sum()
+    for _ in range(_MOST_DESCENTS):
+        _write_tensions(chain, rows, n)
+        for i in range(n):
+            rows[SPARE, i] = rows[ANGLE, i]
+            rows[PULL, i] += added
+        worst, before = _iterate(chain, room, angles, 1.0), energy
+        energy = _misfit(chain, rows, n)
+        if not energy <= before:
+            for i in range(n):
+                rows[ANGLE, i] = rows[SPARE, i]
+            energy, added = _misfit(chain, rows, n), 9.0 * added
+        elif worst < _NEAR:
+            break
+        elif not _SMALL < worst < _FAR:
+            added *= 3.0 if worst > _SMALL else 0.1
+    for i in range(n):
+        rows[ANGLE, i] -= TURN * np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)

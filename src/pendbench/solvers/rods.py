@@ -22,7 +22,6 @@ from pendbench.solvers.closing import (
     ROD_X,
     ROD_Y,
     SPARE,
-    TURN,
     WANTED_X,
     WANTED_Y,
     Chain,
@@ -37,9 +36,8 @@ FINEST = 1024
 #: The members: implicit Euler, BDF2, and the one that conserves energy and momentum.
 EULER, BDF2, CONSERVING = 1, 2, 3
 
-#: What Newton's method begins with: the last turning and how it changed; the last turning; the angles before; or the
-#: way each rod would point without pulls, which is near where it ends when it turns far in a step.
-CHANGING, TURNING, RESTING, PULLED = 0, 1, 2, 3
+#: What Newton's method begins with: the last turning and how it changed; or the last turning.
+CHANGING, TURNING = 0, 1
 
 #: Of a first step, the length squared times the largest angular acceleration, rad.
 _FIRST_TURN = 0.2
@@ -219,7 +217,6 @@ def propose(chain: Chain, state: State, member: int, h: float, guess: int) -> No
     f = _formula(member, h, h / last)
     ahead = (h + last) / (last + before) if guess == CHANGING else 0.0
     later = h if guess == CHANGING else 0.0
-    going = 0.0 if guess == RESTING else h
     for axis in range(2):
         for i in range(n):
             rows[WANTED_X + axis, i] = f.rod * memory[_ROD + axis, i] + f.speed * memory[_SPEED + axis, i]
@@ -230,13 +227,8 @@ def propose(chain: Chain, state: State, member: int, h: float, guess: int) -> No
     rows[WANTED_Y, 0] -= f.scale * chain.gravity
     for i in range(n):
         rate = memory[_TURNED, i]
-        rows[ANGLE, i] = state.q[i] + going * (rate + ahead * (rate - memory[_TURNED_BEFORE, i]))
+        rows[ANGLE, i] = state.q[i] + h * (rate + ahead * (rate - memory[_TURNED_BEFORE, i]))
         rows[PULL, i] = f.scale * (memory[_TENSION, i] + later * memory[_TENSION_RATE, i])
-    if guess == PULLED:
-        for i in range(n):
-            angle = np.arctan2(rows[WANTED_X, i], -rows[WANTED_Y, i])
-            rows[ANGLE, i] = angle - TURN * np.round((angle - state.q[i]) / TURN)
-            rows[PULL, i] = max(rows[PULL, i], 0.0)
 
 
 @compiled
@@ -250,21 +242,6 @@ def miss(chain: Chain, state: State, h: float) -> float:
         y += lengths[i] * rows[ROD_Y, i] - memory[_ROD + 1, i] - h * v_y - half * (v_y - memory[_SPEED_BEFORE + 1, i])
         worst = max(worst, x * x + y * y)
     return float(np.sqrt(worst))
-
-
-def rub(chain: Chain, state: State, mass: float) -> None:
-    """Let neighbours rub off on each other: masses change their speeds by `mass` (kg) times those between them.
-
-    What differs over fewer than sqrt(mass/m) masses m is evened out, and no energy comes of it: (1 + mass A) v = v_0 in
-    the speeds of the rods, where A are the couplings. equations.md, (E65).
-    """
-    from scipy.linalg import solveh_banded
-
-    couplings = mass * chain.couplings
-    bands = np.stack([1.0 + couplings[:-1] + couplings[1:], np.append(-couplings[1:-1], 0.0)])
-    speeds = state.memory[_SPEED : _SPEED + 2]
-    speeds[:] = solveh_banded(bands, speeds.T, lower=True, check_finite=False).T
-    state.memory[_TURNED] = 0.0
 
 
 @compiled
