@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 
+import pendbench as pb
 from pendbench.base.errors import MissingEngineError
 from pendbench.engines import registry
 from pendbench.engines.registry import engine, engine_names, only_by_name
@@ -102,6 +103,19 @@ def test_solve_ivp_gives_the_same():
     made.advance_to(1.0)
     # The two equations differ in rounding alone.
     np.testing.assert_allclose(np.concatenate(made.state()[:2]), found.y[:, 0], rtol=0, atol=1e-12)
+
+
+def test_the_polynomial_of_a_step_is_made_once_for_all_the_states_in_it(monkeypatch):
+    from scipy.integrate import DOP853
+
+    calls = []
+    whole = DOP853._dense_output_impl
+    monkeypatch.setattr(DOP853, "_dense_output_impl", lambda its: calls.append(its.t) or whole(its))
+    times = np.linspace(0.0, 1.0, 201)
+    run = pb.simulate(chain(2, angle=[0.6, 0.9]), "scipy", "dop853", None, times, tolerance=1e-6)
+    assert 0 < len(calls) <= run.steps
+    again = pb.simulate(chain(2, angle=[0.6, 0.9]), "scipy", "dop853", None, times[[0, 77]], tolerance=1e-6)
+    np.testing.assert_array_equal(run.theta[77], again.theta[1])
 
 
 def test_too_many_steps_are_a_status():
