@@ -16,7 +16,7 @@ from pendbench.engines import registry
 from pendbench.engines.registry import engine, engine_names, only_by_name
 from pendbench.engines.silence import silenced
 from pendbench.physics.energy import energy
-from pendbench.scene.scene import Effects
+from pendbench.scene.scene import Effects, load_scene
 from support.installed import installed_engines
 from support.scenes import chain
 
@@ -191,6 +191,19 @@ def test_a_discrete_plant_takes_as_many_steps_as_are_asked_for():
         fall = 1e-6 - run("drake", "discrete", scene, dt, 1).state().theta[0]
         gone = 1e-6 - run("drake", "discrete", scene, dt, 7).state().theta[0]
         assert gone / fall == pytest.approx(28.0, rel=1e-3)
+
+
+@needs("exudyn")
+def test_exudyn_is_as_good_as_the_tolerance_and_goes_on_from_where_it_was():
+    scene = load_scene("challenge")  # a first step of all of an advance would be lost
+    times = np.linspace(0.0, 1.0, 21)
+    truth = pb.reference(scene, times).theta
+    errors = [
+        np.abs(pb.simulate(scene, "exudyn", "dopri5", None, times, tolerance=tolerance).theta - truth).max()
+        for tolerance in (1e-6, 1e-9)
+    ]
+    assert errors[0] < 1e-2
+    assert errors[1] < errors[0] / 100.0  # a thousandth, of which rounding leaves some
 
 
 @needs("exudyn")

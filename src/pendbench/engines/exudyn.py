@@ -1,16 +1,18 @@
-"""Exudyn as an engine: its kinematic tree, in joint angles, under its own solvers, one step at a time.
+"""Exudyn as an engine: its kinematic tree, in joint angles, under its own solvers.
 
 The tree is in minimal coordinates: no joint is a constraint, so nothing can come apart. A link may have no inertia
 about its centre. Nothing has to be switched off: there is no damping by default. Its default solver, generalised alpha,
 has a spectral radius of 0.9, which damps what swings within a few steps, and nothing else.
 
 Effects are a user function in Python that is called at every evaluation of the equations, so methods keep their order.
-A new call of `SolveDynamic` forgets what the implicit solvers know of the last step; so its solvers are driven by the
-functions that `SolveSteps` itself consists of.
+A new call of `SolveDynamic` forgets what the implicit solvers know of the last step; so those with a fixed step are
+driven by the functions that `SolveSteps` itself consists of. DOPRI5, which chooses its steps, is explicit and knows
+nothing of the last: each advance is a call of its own, from the state that the one before left.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final, NamedTuple
 
@@ -21,7 +23,16 @@ from exudyn.itemInterface import NodeGenericODE2, ObjectKinematicTree
 from pendbench.base.faults import Fault
 from pendbench.engines.joint_run import gravity_at, torques_in_joints, weights_in_joints
 from pendbench.engines.joints import absolute_values, bodies, joint_values
-from pendbench.engines.protocol import Mapped, Method, Simulation, State, needed_step, not_finite
+from pendbench.engines.protocol import (
+    AdaptiveSimulation,
+    Mapped,
+    Method,
+    Setting,
+    Simulation,
+    State,
+    needed_step,
+    not_finite,
+)
 from pendbench.physics import acting
 from pendbench.scene.scene import Scene
 
@@ -42,7 +53,11 @@ _SOLVERS: Final = {
     "rk6": _Solver("RK67", True, 6, "a Runge-Kutta method of seven stages"),
     "euler": _Solver("ExplicitEuler", True, 1, "explicit Euler, of angles and rates"),
 }
-_METHODS: Final = {name: Method(solver.order, note=solver.note) for name, solver in _SOLVERS.items()}
+_TOLERANCE: Final = {"tolerance": Setting(1e-8, 1e-13, 1e-2, note="of a step, relative and absolute; Exudyn's is 1e-8")}
+_METHODS: Final = {
+    **{name: Method(solver.order, note=solver.note) for name, solver in _SOLVERS.items()},
+    "dopri5": Method(5, adaptive=True, settings=_TOLERANCE, note="Runge-Kutta of order 5 (4), of Dormand and Prince"),
+}
 _FORCES: Final = "torques in the joints, a user function in Python at every evaluation"
 _EFFECTS: Final = {
     "gravity": Mapped("gravity of the tree"),
@@ -58,28 +73,26 @@ _EFFECTS: Final = {
     "links": Mapped("mass, centre and inertia of the links"),
 }
 _START: Final = exudyn.ConfigurationType.StartOfStep
+_INITIAL: Final = exudyn.ConfigurationType.Initial
+_SHORTEST_STEP: Final = 1e-12  # s; Exudyn's own is 1e-8
+_LONGEST_STEP: Final = 0.01  # s, Exudyn's own: a second in 100 steps
 _MANY: Final = 1_000_000_000  # steps that a solver is told of; it is never asked for all
+exudyn.config.suppressWarnings = True  # it prints them
 
 
-class _Run:
-    """One chain under one solver."""
+class _Chain:
+    """One chain, at its start."""
 
-    def __init__(self, scene: Scene, solver: _Solver, dt: float) -> None:
-        self._failed = False
+    def __init__(self, scene: Scene) -> None:
         self._container = exudyn.SystemContainer()
-        self._mbs = self._container.AddSystem()
+        self.mbs = self._container.AddSystem()
         self._add(scene)
-        self._mbs.Assemble()
-        self._settings = _settings(solver, dt)
-        self._solver = exudyn.MainSolverExplicit() if solver.explicit else exudyn.MainSolverImplicitSecondOrder()
-        self._solver.InitializeSolver(self._mbs, self._settings)
-        self._solver.it.currentStepSize = self._dt = dt
-        self._taken = 0
+        self.mbs.Assemble()
 
     def _add(self, scene: Scene) -> None:
         n, (masses, centres, inertias) = scene.n, bodies(scene)
         offsets = np.append(0.0, scene.lengths[:-1])
-        node = self._mbs.AddNode(
+        node = self.mbs.AddNode(
             NodeGenericODE2(
                 referenceCoordinates=[0.0] * n,
                 initialCoordinates=joint_values(scene.angles).tolist(),
@@ -88,7 +101,7 @@ class _Run:
             )
         )
         changing = acting.is_shaken(scene) or acting.is_pushed(scene)
-        self._mbs.AddObject(
+        self.mbs.AddObject(
             ObjectKinematicTree(
                 nodeNumber=node,
                 jointTypes=[exudyn.JointType.RevoluteZ] * n,
@@ -113,8 +126,28 @@ class _Run:
 
         return forces
 
+    def state(self) -> State:
+        """The state now."""
+        q, v = self.mbs.systemData.GetODE2Coordinates(), self.mbs.systemData.GetODE2Coordinates_t()
+        with np.errstate(all="ignore"):
+            return State(absolute_values(np.array(q)), absolute_values(np.array(v)))
+
+
+class _Stepped:
+    """A run with a fixed step."""
+
+    def __init__(self, scene: Scene, solver: _Solver, dt: float) -> None:
+        self._chain, self._failed, self._taken = _Chain(scene), False, 0
+        self.state = self._chain.state
+        self._settings = _settings(solver.its_name)
+        self._settings.timeIntegration.numberOfSteps = _MANY
+        self._settings.timeIntegration.endTime = _MANY * dt
+        self._solver = exudyn.MainSolverExplicit() if solver.explicit else exudyn.MainSolverImplicitSecondOrder()
+        self._solver.InitializeSolver(self._chain.mbs, self._settings)
+        self._solver.it.currentStepSize = self._dt = dt
+
     def advance(self, steps: int) -> None:
-        mbs, settings, solver = self._mbs, self._settings, self._solver
+        mbs, settings, solver = self._chain.mbs, self._settings, self._solver
         for _ in range(steps):
             if self._failed:
                 return
@@ -124,27 +157,49 @@ class _Run:
             solver.FinishStep(mbs, settings)
             self._taken += 1
 
-    def state(self) -> State:
-        q, v = self._mbs.systemData.GetODE2Coordinates(), self._mbs.systemData.GetODE2Coordinates_t()
-        with np.errstate(all="ignore"):
-            return State(absolute_values(np.array(q)), absolute_values(np.array(v)))
+    def health(self) -> Fault | None:
+        if fault := not_finite(self.state()):
+            return fault
+        return Fault("not converged", "Newton's method gave up in a step") if self._failed else None
+
+
+class _Chosen:
+    """A run that chooses its steps; the first of an advance is tried as the longest."""
+
+    def __init__(self, scene: Scene, tolerance: float) -> None:
+        self._chain, self._time, self._failed = _Chain(scene), 0.0, False
+        self.state = self._chain.state
+        self._settings = _settings("DOPRI5")
+        chosen = self._settings.timeIntegration
+        chosen.absoluteTolerance = chosen.relativeTolerance = tolerance
+        chosen.minimumStepSize = _SHORTEST_STEP
+
+    def advance_to(self, time: float) -> int:
+        if self._failed or time <= self._time:
+            return 0
+        chosen = self._settings.timeIntegration
+        chosen.startTime, chosen.endTime = self._time, time
+        chosen.numberOfSteps = math.ceil((time - self._time) / _LONGEST_STEP)
+        solver, data = exudyn.MainSolverExplicit(), self._chain.mbs.systemData
+        self._failed = not solver.SolveSystem(self._chain.mbs, self._settings)
+        data.SetODE2Coordinates(data.GetODE2Coordinates(), _INITIAL)
+        data.SetODE2Coordinates_t(data.GetODE2Coordinates_t(), _INITIAL)
+        data.SetTime(time, _INITIAL)
+        self._time = time
+        return int(solver.it.currentStepIndex) - 1
 
     def health(self) -> Fault | None:
         if fault := not_finite(self.state()):
             return fault
-        if self._failed:
-            return Fault("not converged", "Newton's method gave up in a step")
-        return None
+        return Fault("work limit", "its control of the step gave up") if self._failed else None
 
 
-def _settings(solver: _Solver, dt: float) -> Any:
+def _settings(its_name: str) -> Any:
     chosen = exudyn.SimulationSettings()
-    chosen.timeIntegration.solverType = getattr(exudyn.DynamicSolverType, solver.its_name)
-    chosen.timeIntegration.numberOfSteps = _MANY
-    chosen.timeIntegration.endTime = _MANY * dt
+    chosen.timeIntegration.solverType = getattr(exudyn.DynamicSolverType, its_name)
     chosen.timeIntegration.verboseMode = 0
-    chosen.timeIntegration.generalizedAlpha.useNewmark = solver.its_name == "TrapezoidalIndex2"
-    chosen.timeIntegration.generalizedAlpha.useIndex2Constraints = solver.its_name == "TrapezoidalIndex2"
+    chosen.timeIntegration.generalizedAlpha.useNewmark = its_name == "TrapezoidalIndex2"
+    chosen.timeIntegration.generalizedAlpha.useIndex2Constraints = its_name == "TrapezoidalIndex2"
     chosen.solution.file.write = False
     return chosen
 
@@ -164,7 +219,8 @@ class ExudynEngine:
         """Nothing but effects."""
         return None
 
-    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:  # noqa: ARG002
-        """A run at time 0; no method has settings."""
-        dt = needed_step(method, dt)
-        return _Run(scene, _SOLVERS[method], dt)
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation | AdaptiveSimulation:
+        """A run at time 0."""
+        if method == "dopri5":
+            return _Chosen(scene, self.methods[method].with_defaults(settings)["tolerance"])
+        return _Stepped(scene, _SOLVERS[method], needed_step(method, dt))
