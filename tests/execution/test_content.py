@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -205,3 +206,17 @@ def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypa
         assert digest() != before, name
         before = digest()
     source.source_digest.cache_clear()
+
+
+def test_the_installed_packages_are_read_once_for_all_engines_until_something_is_installed(monkeypatch, tmp_path):
+    read = []
+    whole = fingerprints.metadata.packages_distributions
+    monkeypatch.setattr(fingerprints.metadata, "packages_distributions", lambda: read.append(1) or whole())
+    monkeypatch.syspath_prepend(tmp_path)
+    for library in ("numpy", "scipy"):
+        assert list(fingerprints._parts(library))
+    assert len(read) == 1
+    (tmp_path / "another").mkdir()
+    os.utime(tmp_path, ns=(0, 1))  # as later as a clock can tell
+    list(fingerprints._parts("numpy"))
+    assert len(read) == 2

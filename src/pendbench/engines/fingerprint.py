@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+import os
+import sys
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import metadata
 from importlib.util import find_spec
@@ -28,6 +30,18 @@ def fingerprint(name: str) -> str:
     return _of_libraries(frozenset({adapter, *getattr(its, "libraries", (its.name,))} - {"pendbench"}))
 
 
+def installed() -> tuple[tuple[str, int], ...]:
+    """Where modules are found: each folder, and when something was last put there or taken away, ns."""
+    return tuple((path, os.stat(path).st_mtime_ns) for path in sys.path if os.path.isdir(path))
+
+
+@cache
+def _distributions(where: tuple[tuple[str, int], ...]) -> Mapping[str, list[str]]:
+    """The distributions of each top-level package, for what is installed now: to read all of them takes 0.2 s."""
+    del where
+    return metadata.packages_distributions()
+
+
 @cache
 def _of_libraries(libraries: frozenset[str]) -> str:
     digest = hashlib.sha256()
@@ -45,7 +59,7 @@ def _parts(library: str) -> Iterator[bytes]:
         return
     if spec is None:
         return
-    names = metadata.packages_distributions().get(library, [])
+    names = _distributions(installed()).get(library, [])
     records = [_record(distribution) for distribution in sorted(names)]
     if records and all(records):
         yield from (record.encode() for record in records if record)

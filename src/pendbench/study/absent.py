@@ -13,6 +13,7 @@ from typing import Final
 
 from pendbench.base.errors import InputError, MissingEngineError, printable
 from pendbench.base.processes import processors
+from pendbench.engines.fingerprint import installed
 from pendbench.engines.registry import comes_along, engine, is_foreign, python_of
 
 _HANGS_S: Final = 300.0
@@ -57,12 +58,7 @@ def _why(name: str) -> str:
 
 def _why_apart(name: str) -> str:
     """The same, as a process says that loads it. What can change under this one's feet is asked each time."""
-    return _ask(name) if is_foreign(name) or python_of(name) else _ask_once(name, _installed())
-
-
-def _installed() -> tuple[tuple[str, int], ...]:
-    """Where modules are found: each folder, and when something was last put there or taken away, ns."""
-    return tuple((path, os.stat(path).st_mtime_ns) for path in sys.path if os.path.isdir(path))
+    return _ask(name) if is_foreign(name) or python_of(name) else _ask_once(name, installed())
 
 
 @cache
