@@ -193,6 +193,15 @@ def test_a_discrete_plant_takes_as_many_steps_as_are_asked_for():
         assert gone / fall == pytest.approx(28.0, rel=1e-3)
 
 
+@needs("newton")
+def test_the_two_solvers_of_newton_are_the_same_method_and_no_damping_is_on():
+    scene = chain(2, angle=[0.3, 0.4])
+    ends = [run("newton", method, scene, 1 / 256, 256).state().theta for method in ("featherstone", "steel")]
+    assert np.abs(ends[0] - ends[1]).max() < 1e-5  # single precision
+    euler = run("mujoco", "euler", scene, 1 / 256, 256).state().theta
+    assert np.abs(ends[0] - euler).max() < 5e-4  # the plateau; a damping of 0.05 would be off by more
+
+
 @needs("exudyn")
 def test_exudyn_is_as_good_as_the_tolerance_and_goes_on_from_where_it_was():
     scene = load_scene("challenge")  # a first step of all of an advance would be lost

@@ -12,7 +12,6 @@ nothing of the last: each advance is a call of its own, from the state that the 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final, NamedTuple
 
@@ -75,7 +74,7 @@ _EFFECTS: Final = {
 _START: Final = exudyn.ConfigurationType.StartOfStep
 _INITIAL: Final = exudyn.ConfigurationType.Initial
 _SHORTEST_STEP: Final = 1e-12  # s; Exudyn's own is 1e-8
-_LONGEST_STEP: Final = 0.01  # s, Exudyn's own: a second in 100 steps
+_FIRST_STEP: Final = 0.01  # s, the longest that Exudyn takes by default; one that ends in infinities would be kept
 _MANY: Final = 1_000_000_000  # steps that a solver is told of; it is never asked for all
 exudyn.config.suppressWarnings = True  # it prints them
 
@@ -164,7 +163,7 @@ class _Stepped:
 
 
 class _Chosen:
-    """A run that chooses its steps; the first of an advance is tried as the longest."""
+    """A run that chooses its steps, in each advance from a short one on."""
 
     def __init__(self, scene: Scene, tolerance: float) -> None:
         self._chain, self._time, self._failed = _Chain(scene), 0.0, False
@@ -173,13 +172,14 @@ class _Chosen:
         chosen = self._settings.timeIntegration
         chosen.absoluteTolerance = chosen.relativeTolerance = tolerance
         chosen.minimumStepSize = _SHORTEST_STEP
+        chosen.numberOfSteps = 1  # no step is longer than the time to be advanced
 
     def advance_to(self, time: float) -> int:
         if self._failed or time <= self._time:
             return 0
         chosen = self._settings.timeIntegration
         chosen.startTime, chosen.endTime = self._time, time
-        chosen.numberOfSteps = math.ceil((time - self._time) / _LONGEST_STEP)
+        chosen.initialStepSize = min(_FIRST_STEP, time - self._time)
         solver, data = exudyn.MainSolverExplicit(), self._chain.mbs.systemData
         self._failed = not solver.SolveSystem(self._chain.mbs, self._settings)
         data.SetODE2Coordinates(data.GetODE2Coordinates(), _INITIAL)

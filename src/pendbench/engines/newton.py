@@ -1,8 +1,8 @@
-"""Newton as an engine: its Featherstone solver, in joint angles, on a processor.
+"""Newton as an engine: its two solvers in joint angles, Featherstone and Steel, on a processor.
 
-All numbers are of single precision. On by default and switched off: an angular damping of 0.05, with which a free
-chain loses energy; limits of the joints have no stiffness. A step is some launches of kernels from Python, and the
-first one compiles for minutes, unless Warp has them in its cache.
+All numbers are of single precision, and nothing has to be switched off: Featherstone's angular damping of 0.05 is a
+setting that no kernel of it reads, and limits of the joints have no stiffness here. A step is some launches of kernels
+from Python, and the first one compiles for minutes, unless Warp has them in its cache.
 
 Newton's other solvers do not hold a chain of points, as docs/engines.md says of each.
 """
@@ -19,7 +19,7 @@ import numpy as np
 from pendbench.base.arrays import FloatArray
 from pendbench.engines.joint_run import JointRun, gravity_at
 from pendbench.engines.joints import bodies, joint_values
-from pendbench.engines.protocol import Mapped, Method, Setting, Simulation, needed_step
+from pendbench.engines.protocol import Mapped, Method, Simulation, needed_step
 from pendbench.engines.silence import silenced
 from pendbench.physics import acting
 from pendbench.scene.scene import Scene
@@ -31,14 +31,10 @@ with silenced():  # it says which devices there are
     warp.config.log_level = warp.LOG_ERROR  # and later what it compiles
     warp.init()
 
+_SOLVERS: Final = {"featherstone": "SolverFeatherstone", "steel": "SolverSteel"}
 _METHODS: Final = {
-    "featherstone": Method(
-        1,
-        settings={"default_flags": Setting(0, 0, 1, integer=True, note="1: angular damping of 0.05 stays on")},
-        single=True,
-        plateau=5e-4,
-        note="semi-implicit Euler, its angular damping off",
-    ),
+    "featherstone": Method(1, single=True, plateau=5e-4, note="semi-implicit Euler"),
+    "steel": Method(1, single=True, plateau=5e-4, note="semi-implicit Euler; Newton's newest solver, experimental"),
 }
 _TORQUES: Final = "torques in the joints, computed in Python before each step"
 _EFFECTS: Final = {
@@ -61,7 +57,7 @@ _FAR: Final = 1e9  # rad: no limit
 class _Chain:
     """A model with one articulation, and two states that take turns."""
 
-    def __init__(self, scene: Scene, dt: float, default: bool) -> None:
+    def __init__(self, scene: Scene, method: str, dt: float) -> None:
         self._dt, self._heaviest = dt, float(bodies(scene).masses.max())
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # points have no inertia, of which it warns
@@ -69,8 +65,7 @@ class _Chain:
         self._now, self._next = self._model.state(), self._model.state()
         self._control = self._model.control()
         newton.eval_fk(self._model, self._model.joint_q, self._model.joint_qd, self._now)
-        damping = {} if default else {"angular_damping": 0.0}
-        self._solver = newton.solvers.SolverFeatherstone(self._model, **damping)
+        self._solver = getattr(newton.solvers, _SOLVERS[method])(self._model)
         self._solver.step(self._now, self._next, self._control, None, dt)  # compiles, and is forgotten
 
     def _made(self, scene: Scene) -> Any:
@@ -129,8 +124,6 @@ class NewtonEngine:
             return f"{scene.n} links; a step of more than {_MOST_LINKS} takes Newton too long on a processor"
         return None
 
-    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:
-        """A run at time 0."""
-        dt = needed_step(method, dt)
-        default = bool(self.methods[method].with_defaults(settings)["default_flags"])
-        return JointRun(scene, dt, _Chain(scene, dt, default))
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation:  # noqa: ARG002
+        """A run at time 0; no method has settings."""
+        return JointRun(scene, needed_step(method, dt), _Chain(scene, method, needed_step(method, dt)))
