@@ -50,6 +50,46 @@ state = euler.begin(np.array([0.0]), np.array([1.0]))
 euler.advance(chain, state, 0, 0.5, 1)
 print(state.q[0])
 """
+PARTS = """
+import math
+from pendbench.base.compiled import compiled, inlined, part
+
+@inlined
+def halved(x):
+    return 0.5 * x
+
+@part
+def root(x):
+    if x < 0.0:
+        raise ValueError("x is below 0")
+    return halved(math.sqrt(x))
+"""
+WHOLES = "".join(
+    f"""
+from parts import compiled, halved, root
+
+@compiled
+def {name}(x, times):
+    total = 0.0
+    for k in range(times):
+        total += root(x)
+    return total
+"""
+    for name in ("sums", "again")
+)
+# What a kernel finds of another, and how much machine code there is of each: nobody calls that of `root` and `halved`.
+USE_PARTS = """
+import parts, wholes
+found = wholes.KERNEL(16.0, 3)
+try:
+    wholes.KERNEL(-1.0, 1)
+except ValueError as error:
+    assert str(error) == "x is below 0"
+for kernel, runs in ((wholes.KERNEL, True), (parts.root, False), (parts.halved, False)):
+    if not sum(kernel.stats.cache_hits.values()):
+        assert all(("\\tret" in code) == runs for code in kernel.inspect_asm().values())
+print(found + 100 * sum(parts.root.stats.cache_hits.values()))
+"""
 # Watches numba compile a kernel for a system with effects, and one in 32 digits; prints how many functions it was.
 WATCHED = """
 from pathlib import Path
@@ -277,3 +317,42 @@ def test_plugin_s_kernels_are_neither_stale_nor_in_the_way_of_others(tmp_path, m
     assert run(USE_PLUGIN, cache) == 0.5
     plugin.unlink()
     assert run(USE_CHAIN, cache) == 0.5
+
+
+def test_no_machine_code_is_made_of_what_others_take_in(tmp_path, monkeypatch):
+    """And they take it in as well when it comes from the cache."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "parts.py").write_text(PARTS)
+    (tmp_path / "wholes.py").write_text(WHOLES)
+    assert run(USE_PARTS.replace("KERNEL", "sums"), tmp_path / "cache") == 6.0
+    assert run(USE_PARTS.replace("KERNEL", "again"), tmp_path / "cache") == 106.0
+    assert run(USE_PARTS.replace("KERNEL", "sums"), tmp_path / "cache") == 6.0  # as a whole from the cache
+
+
+# What only one kind of system asks for: of which effects, and what other systems are spared.
+SPARED = """
+import numba
+import numpy as np
+from pendbench.physics.kernels import both_ends, massless
+from pendbench.physics.kernels.table import system_of
+from pendbench.scene.scene import Effects, Scene
+from pendbench.solvers import problem
+
+@numba.njit
+def accelerate(system, t, q, v, a):
+    problem.acceleration(system, t, q, v, a)
+
+effects = Effects(gravity=1.0, EFFECT)
+scene = Scene("one", "", 1.0, [1.0], [1.0], [0.0], [1.0], effects)
+accelerate(system_of(scene), 0.0, np.array([0.5]), np.zeros(1), np.zeros(1))
+print(len(massless.inwards.signatures) + 10 * len(both_ends.write_tensions.signatures))
+"""
+
+
+@pytest.mark.parametrize(
+    ("effect", "compiled_for"),
+    [("joint_damping=0.1", 1), ("driven_pivot={'axis': 'x', 'amplitude': 1, 'angular_frequency': 1}", 10)],
+    ids=["pushed", "not pushed"],
+)
+def test_a_chain_has_one_way_to_its_accelerations_compiled(effect, compiled_for, tmp_path):
+    assert run(SPARED.replace("EFFECT", effect), tmp_path) == compiled_for

@@ -22,9 +22,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+import llvmlite.binding as llvm
 import numba
 from numba.core import config as numba_config
-from numba.core.registry import CPUDispatcher
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.extending import overload
 
 config: Any = numba_config  # its attributes are set while it is imported
@@ -37,8 +40,44 @@ _KERNEL_SOURCES = ("base/compiled.py", "effects/*.py", "physics/**/*.py", "solve
 #: A product and a sum may be rounded once instead of twice.
 _OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
 
+#: How the names begin that numba gives to the variables in which kernels find what they need of Python.
+_ENVIRONMENT = "_ZN08NumbaEnv"
+
+
+class _Linked(JITCodeLibrary):
+    """The code of a kernel that only others call.
+
+    They take its optimised code into their own and make machine code of all of it, so nobody runs machine code of it
+    alone, which takes a seventh of the time to compile. numba makes that of what is left here: the variables in which
+    kernels find what they need of Python.
+    """
+
+    def _finalize_final_module(self) -> None:
+        its: Any = self
+        its._finalize_dynamic_globals()
+        its._finalized = True  # as far as those want it who take its code
+        names = [variable.name for variable in its._get_module_for_linking().global_variables]
+        left = its._codegen._create_empty_module(self.name)
+        for name in names:
+            if name.startswith(_ENVIRONMENT):
+                cpu_target.target_context.declare_env_global(left, name)
+        its._final_module = llvm.parse_assembly(str(left))
+        super()._finalize_final_module()  # type: ignore[no-untyped-call]
+
+
+class _ForOthers(Compiler):
+    """numba's compiler, for such kernels."""
+
+    def compile_extra(self, func: Any) -> Any:
+        if self.state.library is None:
+            library: Any = _Linked(self.state.targetctx.codegen(), func.__qualname__)  # type: ignore[no-untyped-call]
+            library.enable_object_caching()
+            self.state.library = library
+        return super().compile_extra(func)  # type: ignore[no-untyped-call]
+
+
 #: Such a kernel cannot be called but by others: what Python would need is a tenth of the time to compile it.
-_PART: Any = {**_OPTIONS, "no_cpython_wrapper": True}
+_PART: Any = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": _ForOthers}
 _INLINED: Any = {**_PART, "forceinline": True}
 
 _IMPORT = re.compile(r"^[ \t]*(?:from|import)[ \t]+([\w.]+)(?=(.*?)(?:\n[ \t]*\n|\Z))", re.DOTALL | re.MULTILINE)
@@ -189,15 +228,21 @@ def _compiled(function: Kernel, options: Any) -> Kernel:
     return kernel
 
 
-def specialise(generic: Callable[..., None], system: type, kernel: Callable[..., None]) -> None:
+def specialise(
+    generic: Callable[..., None],
+    system: type,
+    kernel: Callable[..., None],
+    where: Callable[[dict[str, Any]], bool] = lambda _: True,
+) -> None:
     """Have `generic(s, *rest)`, called in a kernel, be `kernel(s, *rest)` where s is of the NamedTuple class `system`.
 
-    The choice is made while compiling, by the type of s.
+    where: and where this is true of the numba types of its fields. The choice is made while compiling, by the type of
+    s: what a kernel asks for itself has both answers compiled, and one of them thrown away.
     """
     _know_source(_source(kernel))
 
     def choose(s: Any, *rest: Any) -> Callable[..., None] | None:  # noqa: ARG001
-        if getattr(s, "instance_class", None) is not system:
+        if getattr(s, "instance_class", None) is not system or not where(dict(zip(s.fields, s.types, strict=True))):
             return None
         # Inlined as it is: a call in between would cost a third of a second, for each type that it is compiled for.
         return kernel.py_func if isinstance(kernel, _Inlined) else call

@@ -31,19 +31,14 @@ def _write_derivative(system: Any, t: float, y: FloatArray, dy: FloatArray) -> N
     problem.acceleration(system, t, y[:n], y[n:], dy[n:])
 
 
-@inlined
-def _write_massless(system: System, t: float, theta: FloatArray, omega: FloatArray, out: FloatArray) -> None:
-    """Write the accelerations of a chain on massless rods; which way is known while compiling."""
-    if len(system.joints) + len(system.drags) > 0:
-        massless.write_accelerations(system, t, theta, omega, out)
-    else:
-        both_ends.write_accelerations(system, t, theta, omega, out)
+def _pushed(kinds: Mapping[str, Any]) -> bool:
+    """Whether anything but weight acts on the masses of a system whose fields are of these types."""
+    return len(kinds["joints"]) + len(kinds["drags"]) > 0
 
 
 TABLE: Final[Mapping[type, Mapping[Callable[..., None], Callable[..., None]]]] = {
     System: {
         problem.derivative: _write_derivative,
-        problem.acceleration: _write_massless,
         problem.momentum: canonical.write_momenta,
         problem.velocity: canonical.write_rates,
         problem.generalized_force: canonical.write_forces,
@@ -70,6 +65,8 @@ TABLE: Final[Mapping[type, Mapping[Callable[..., None], Callable[..., None]]]] =
 for _system, _kernels in TABLE.items():
     for _asked, _kernel in _kernels.items():
         specialise(_asked, _system, _kernel)
+specialise(problem.acceleration, System, massless.write_accelerations, where=_pushed)
+specialise(problem.acceleration, System, both_ends.write_accelerations, where=lambda kinds: not _pushed(kinds))
 
 
 def series_system_of(scene: Scene, order: int) -> SeriesSystem | SingleSystem:
