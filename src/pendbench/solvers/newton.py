@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 from pendbench.base.arrays import FloatArray
-from pendbench.base.compiled import compiled
+from pendbench.base.compiled import compiled, part
 from pendbench.solvers.collocation import NEAR, Collocation, Motion, add_slopes, combine
+from pendbench.solvers.copying import copy
 from pendbench.solvers.problem import generalized_force, momentum, velocity
 
 #: Nothing is solved for systems with more coordinates: a step would take a second and more.
@@ -33,33 +34,39 @@ _SLOWEST = 0.5
 _DIFFERENCE = 1e-7
 
 
-@compiled
+@part
 def _write_derivatives(system: Any, t: float, q: FloatArray, v: FloatArray, matrices: FloatArray) -> None:
-    """Write dp/dv, dp/dq - df/dv and df/dq at time t (s), q (d,), v (d,) into matrices (3, d, d), columns in rows."""
+    """Write dp/dv, dp/dq - df/dv and df/dq at time t (s), q (d,), v (d,) into matrices (3, d, d), columns in rows.
+
+    In one loop, over the point itself, d rates and d angles: each call in a kernel is compiled into it anew.
+    """
     d = len(q)
-    p0, f0, p, f, moved = np.empty(d), np.empty(d), np.empty(d), np.empty(d), np.empty(d)
-    momentum(system, q, v, p0)
-    generalized_force(system, t, q, v, f0)
-    for k in range(d):
-        for i in range(d):
-            moved[i] = 0.0
-        moved[k] = 1.0
-        momentum(system, q, moved, p)  # linear in the rates
-        for i in range(d):
-            matrices[0, k, i] = p[i]
-            moved[i] = v[i]
+    room = np.zeros((7, d))  # one piece of memory: a chain of few links takes as long to ask for seven
+    p0, f0, p, f, angles, rates, one = room[0], room[1], room[2], room[3], room[4], room[5], room[6]
+    copy(q, angles)
+    copy(v, rates)
+    for run in range(2 * d + 1):
+        k, turns = (run - 1) % d, 0 < run <= d
         step = _DIFFERENCE * (1.0 + abs(v[k]))
-        moved[k] += step
-        generalized_force(system, t, q, moved, f)
-        for i in range(d):
-            matrices[1, k, i] = -(f[i] - f0[i]) / step
-            moved[i] = q[i]
-        moved[k] += _DIFFERENCE
-        momentum(system, moved, v, p)
-        generalized_force(system, t, moved, v, f)
-        for i in range(d):
-            matrices[1, k, i] += (p[i] - p0[i]) / _DIFFERENCE
-            matrices[2, k, i] = (f[i] - f0[i]) / _DIFFERENCE
+        if turns:
+            rates[k] += step
+            one[k] = 1.0  # the momentum is linear in the rates
+        elif run > 0:
+            angles[k] += _DIFFERENCE
+        momentum(system, angles, one if turns else v, p)
+        generalized_force(system, t, angles, rates, f)
+        angles[k], rates[k], one[k] = q[k], v[k], 0.0
+        if turns:
+            for i in range(d):
+                matrices[0, k, i] = p[i]
+                matrices[1, k, i] = -(f[i] - f0[i]) / step
+        elif run > 0:
+            for i in range(d):
+                matrices[1, k, i] += (p[i] - p0[i]) / _DIFFERENCE
+                matrices[2, k, i] = (f[i] - f0[i]) / _DIFFERENCE
+        else:
+            copy(p, p0)
+            copy(f, f0)
 
 
 @compiled
@@ -110,7 +117,7 @@ def _write_matrices(h: float, method: Collocation, matrices: FloatArray, factors
         _factorise(factors[mode], pivots[mode])
 
 
-@compiled
+@part
 def _write_residuals(
     system: Any, method: Collocation, motion: Motion, step: int, h: float, residuals: FloatArray
 ) -> None:
@@ -150,7 +157,7 @@ def _improve(method: Collocation, factors: Any, pivots: Any, residuals: FloatArr
     return largest
 
 
-@compiled
+@part
 def _solve_stages(system: Any, method: Collocation, motion: Motion, step: int, h: float) -> bool:
     """Find the slopes of step number `step` of h (s); False where that does not converge, or the system is too large.
 
