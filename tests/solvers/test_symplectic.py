@@ -82,7 +82,8 @@ SOLVERS = {"iteration": gauss.collocate, "newton": newton.collocate_by_newton}
 
 
 def start_of(scene: Scene, stages: int) -> Motion:
-    momenta = written(canonical.write_momenta, scene, scene.angles, scene.rates)
+    bare = dataclasses.replace(scene, effects=Effects())  # they are the same, and one kernel has them all
+    momenta = written(canonical.write_momenta, bare, scene.angles, scene.rates)
     return motion_from(scene.angles, momenta, scene.rates, stages)
 
 
@@ -106,7 +107,7 @@ def test_modes_take_the_method_apart(stages: int) -> None:
     assert len(method.eigenvalues) == (stages + 1) // 2
 
 
-@pytest.mark.parametrize("effects", [{}, {"joint_damping": 0.4, "air_drag": {"linear": 0.1, "quadratic": 0.2}}])
+@pytest.mark.parametrize("effects", [{}, {"joint_damping": 0.4}, {"air_drag": {"linear": 0.1, "quadratic": 0.2}}])
 @pytest.mark.parametrize("stages", [2, 3])
 def test_newton_finds_what_the_iteration_finds(stages: int, effects: dict[str, object]) -> None:
     """So it has the same order. Steps of 10 ms: to rounding, which the chain's motion makes ten times larger."""
