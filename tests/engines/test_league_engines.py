@@ -16,7 +16,7 @@ from pendbench.engines import registry
 from pendbench.engines.registry import engine, engine_names, only_by_name
 from pendbench.engines.silence import silenced
 from pendbench.physics.energy import energy
-from pendbench.scene.scene import Effects, load_scene
+from pendbench.scene.scene import Effects, Scene, load_scene
 from support.installed import installed_engines
 from support.scenes import chain
 
@@ -200,6 +200,21 @@ def test_the_two_solvers_of_newton_are_the_same_method_and_no_damping_is_on():
     assert np.abs(ends[0] - ends[1]).max() < 1e-5  # single precision
     euler = run("mujoco", "euler", scene, 1 / 256, 256).state().theta
     assert np.abs(ends[0] - euler).max() < 5e-4  # the plateau; a damping of 0.05 would be off by more
+
+
+@needs("pybullet")
+def test_pybullets_motors_hold_a_chain_as_it_comes_but_not_a_heavy_one():
+    """A motor gives at most 1 N m s in a step: at 1/240 s it holds 240 N m, so 24 kg at 1 m under 10 m/s^2."""
+    turned = []
+    for mass in (23.0, 30.0):
+        scene = Scene.chain(n=1, length=1.0, mass=mass, angles=math.pi / 2, gravity=10.0)
+        moved = [run("pybullet", "multibody", scene, 1 / 240, 60, default_flags=flags).state() for flags in (1, 2)]
+        turned.append([abs(each.theta[0] - math.pi / 2) for each in moved])
+    free, held = np.transpose(turned)
+    assert free == pytest.approx(free[0])  # the motors are off: it falls, whatever it weighs
+    assert free[0] > 0.2
+    assert held[0] < 1e-3
+    assert held[1] > 1e-2
 
 
 @needs("exudyn")

@@ -31,7 +31,7 @@ _METHODS: Final = {
         1,
         settings={
             "substeps": Setting(1, 1, 1000, integer=True, note="of each step; Bullet's own number is 1"),
-            "default_flags": Setting(0, 0, 1, integer=True, note="1: damping and limits stay on; motors do not"),
+            "default_flags": Setting(0, 0, 2, integer=True, note="1: damping and limits stay on; 2: and motors"),
         },
         note="Featherstone's algorithm and semi-implicit Euler, motors and damping off",
     )
@@ -59,15 +59,20 @@ _OFF: Final[Mapping[str, Any]] = {
     "maxJointVelocity": 1e12,  # rad/s
     "activationState": bullet.ACTIVATION_STATE_DISABLE_SLEEPING,
 }
+_ALL: Final = 2  # of `default_flags`: nothing is switched off
 _BASES: Final = ("linearDamping", "angularDamping")
 
 
 class _Chain:
     """A world with one chain in it, each in a physics server of its own."""
 
-    def __init__(self, scene: Scene, dt: float, substeps: int, default: bool) -> None:
+    def __init__(self, scene: Scene, dt: float, substeps: int, default: int) -> None:
         self._client, self._joints = bullet.connect(bullet.DIRECT), range(scene.n)
+        # A motor is so strong whatever the chain weighs, so it has to hang on the true masses.
+        self._scale = 1.0 if default == _ALL else float(bodies(scene).masses.max())
         self._body = self._made(scene, {} if default else _OFF)
+        if default != _ALL:
+            self._set_motors(bullet.VELOCITY_CONTROL, [0.0] * scene.n)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=dt, numSubSteps=0 if substeps == 1 else substeps, physicsClientId=self._client
         )
@@ -87,7 +92,7 @@ class _Chain:
         ends = [[0.0, 0.0, 0.0], *([0.0, -length, 0.0] for length in scene.lengths[:-1].tolist())]
         body = bullet.createMultiBody(
             baseMass=0.0,
-            linkMasses=(masses / masses.max()).tolist(),
+            linkMasses=(masses / self._scale).tolist(),
             linkCollisionShapeIndices=[-1] * n,
             linkVisualShapeIndices=[-1] * n,
             linkPositions=ends,
@@ -99,16 +104,15 @@ class _Chain:
             linkJointAxis=[[0.0, 0.0, 1.0]] * n,
             physicsClientId=self._client,
         )
-        self._scale = float(masses.max())
         for link, inertia in zip(self._joints, (inertias / self._scale).tolist(), strict=True):
             bullet.changeDynamics(body, link, physicsClientId=self._client, **off)
             # A call of its own: beside the others it is lost.
             bullet.changeDynamics(body, link, localInertiaDiagonal=[inertia] * 3, physicsClientId=self._client)
         bullet.changeDynamics(body, -1, physicsClientId=self._client, **{key: 0.0 for key in off if key in _BASES})
-        bullet.setJointMotorControlArray(
-            body, self._joints, bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=self._client
-        )
         return int(body)
+
+    def _set_motors(self, mode: int, forces: list[float]) -> None:
+        bullet.setJointMotorControlArray(self._body, self._joints, mode, forces=forces, physicsClientId=self._client)
 
     def step(self, steps: int) -> None:
         for _ in range(steps):
@@ -122,10 +126,7 @@ class _Chain:
         bullet.setGravity(x, y, 0.0, physicsClientId=self._client)
 
     def push(self, torques: FloatArray) -> None:
-        forces = (torques / self._scale).tolist()
-        bullet.setJointMotorControlArray(
-            self._body, self._joints, bullet.TORQUE_CONTROL, forces=forces, physicsClientId=self._client
-        )
+        self._set_motors(bullet.TORQUE_CONTROL, (torques / self._scale).tolist())
 
 
 class PybulletEngine:
@@ -149,4 +150,4 @@ class PybulletEngine:
         """A run at time 0."""
         dt = needed_step(method, dt)
         chosen = self.methods[method].with_defaults(settings)
-        return JointRun(scene, dt, _Chain(scene, dt, int(chosen["substeps"]), bool(chosen["default_flags"])))
+        return JointRun(scene, dt, _Chain(scene, dt, int(chosen["substeps"]), int(chosen["default_flags"])))
