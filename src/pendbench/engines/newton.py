@@ -111,6 +111,7 @@ class NewtonEngine:
 
     name = "newton"
     libraries = ("newton", "warp")
+    compiles = True
     methods: Mapping[str, Method] = _METHODS
     effects: Mapping[str, Mapped] = _EFFECTS
 

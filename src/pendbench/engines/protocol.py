@@ -123,7 +123,8 @@ class AdaptiveSimulation(Protocol):
 class Engine(Protocol):
     """A program that can simulate scenes.
 
-    It may say by `default_method(scene, settings)` which method is run where none is named.
+    It may say by `default_method(scene, settings)` which method is run where none is named, and by `compiles = True`
+    that the first run of a method compiles for long what all later ones find, those of other processes, too.
 
     It may also have `effects`, a mapping of effects' names to `Mapped`: scenes with others are refused for it, and the
     documentation has them in its table. An engine without one is taken to know gravity, and nothing else.

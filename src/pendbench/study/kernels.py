@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from pendbench.base.errors import InputError
 from pendbench.engines.recording import simulate
 from pendbench.engines.registry import engine
+from pendbench.execution.limits import uncounted
 from pendbench.execution.runner import Runner
-from pendbench.execution.tasks import task
+from pendbench.execution.tasks import Task, task
 from pendbench.physics.acting import is_plain
 from pendbench.scene.scene import Scene
 from pendbench.study.case import Case
@@ -49,8 +50,16 @@ def compile_kernel(name: str, scene: Scene) -> Compiled:
     return Compiled("ok")
 
 
+def compile_engine(case: Case) -> Compiled:
+    """Begin a run of an engine that keeps what it compiles: two processes that begin one together compile the same."""
+    with uncounted():
+        engine(case.engine).build(case.scene, case.method, case.dt, **dict(case.settings))
+    return Compiled("ok")
+
+
 def compile_kernels(runner: Runner, scenes: Iterable[Scene], cases: Iterable[Case], *, truth: bool = True) -> None:
     """Compile the kernels of the cases, and of the scenes' truth; each for the effects that act on its scene."""
+    cases = tuple(cases)
     methods: dict[tuple[str, frozenset[str]], Scene] = {}
     forms: dict[tuple[str, frozenset[str]], Scene] = {}
     for case in cases:
@@ -62,4 +71,13 @@ def compile_kernels(runner: Runner, scenes: Iterable[Scene], cases: Iterable[Cas
     # By turns: two methods begun side by side compile the same equations, and so do two forms of the truth.
     turns = itertools.zip_longest(methods.items(), forms.items())
     wanted = dict(filter(None, itertools.chain.from_iterable(turns)))
-    runner.run("kernels compiled", {key: task(compile_kernel, key[0], scene) for key, scene in wanted.items()})
+    tasks: dict[Any, Task[Compiled]] = {case: task(compile_engine, case) for case in _first_of_compiling(cases)}
+    tasks |= {key: task(compile_kernel, key[0], scene) for key, scene in wanted.items()}
+    runner.run("kernels compiled", tasks)
+
+
+def _first_of_compiling(cases: Sequence[Case]) -> Iterable[Case]:
+    """A case of each method of engines that say that they compile; they take longest, so they come first."""
+    names = {case.engine for case in cases}
+    compiling = {name for name in names if getattr(engine(name), "compiles", False)}
+    return {(case.engine, case.method): case for case in reversed(cases) if case.engine in compiling}.values()

@@ -1,0 +1,37 @@
+"""What is compiled before a study's jobs begin."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from pendbench.execution import limits
+from pendbench.study import kernels
+from pendbench.study.case import Case
+from pendbench.study.kernels import Compiled, compile_engine, compile_kernel, compile_kernels
+from support.oracle import Oracle
+from support.scenes import chain
+
+
+def test_an_engine_that_compiles_is_begun_once_for_each_of_its_methods_and_before_all_else(monkeypatch):
+    monkeypatch.setattr(kernels, "engine", lambda name: SimpleNamespace(compiles=name == "newton"))
+    own = [("newton", "steel", 0.1), ("newton", "steel", 0.05), ("newton", "featherstone", 0.1)]
+    cases = [Case(chain(2), *each) for each in [("analytic", "rk4", 0.1), *own, ("mujoco", "rk4", 0.1)]]
+    oracle = Oracle({compile_engine: lambda _: Compiled("ok")})
+    compile_kernels(oracle, (), cases, truth=False)
+    first, second, third = oracle.stages["kernels compiled"]
+    assert {first.arguments, second.arguments} == {(cases[1],), (cases[3],)}
+    assert third.function is compile_kernel
+
+
+def test_what_an_engine_compiles_does_not_count_against_the_limit_of_its_job(monkeypatch):
+    left = []
+
+    def build(*_, **settings):
+        left.append((limits._left[:], settings))
+
+    monkeypatch.setattr(kernels, "engine", lambda _: SimpleNamespace(build=build))
+    with limits.processor_time(60.0):
+        assert compile_engine(Case(chain(2), "newton", "steel", 0.1, (("flag", 1),))).status == "ok"
+    [(stopped, settings)] = left
+    assert 0.0 < stopped[0] < 61.0
+    assert settings == {"flag": 1}
