@@ -50,10 +50,11 @@ def compile_kernel(name: str, scene: Scene) -> Compiled:
     return Compiled("ok")
 
 
-def compile_engine(case: Case) -> Compiled:
-    """Begin a run of an engine that keeps what it compiles: two processes that begin one together compile the same."""
+def compile_engine(cases: tuple[Case, ...]) -> Compiled:
+    """Begin runs of an engine that keeps what it compiles: two processes that begin one together compile the same."""
     with uncounted():
-        engine(case.engine).build(case.scene, case.method, case.dt, **dict(case.settings))
+        for case in cases:
+            engine(case.engine).build(case.scene, case.method, case.dt, **dict(case.settings))
     return Compiled("ok")
 
 
@@ -71,13 +72,14 @@ def compile_kernels(runner: Runner, scenes: Iterable[Scene], cases: Iterable[Cas
     # By turns: two methods begun side by side compile the same equations, and so do two forms of the truth.
     turns = itertools.zip_longest(methods.items(), forms.items())
     wanted = dict(filter(None, itertools.chain.from_iterable(turns)))
-    tasks: dict[Any, Task[Compiled]] = {case: task(compile_engine, case) for case in _first_of_compiling(cases)}
+    tasks: dict[Any, Task[Compiled]] = {own: task(compile_engine, own) for own in _of_compiling_engines(cases)}
     tasks |= {key: task(compile_kernel, key[0], scene) for key, scene in wanted.items()}
     runner.run("kernels compiled", tasks)
 
 
-def _first_of_compiling(cases: Sequence[Case]) -> Iterable[Case]:
-    """A case of each method of engines that say that they compile; they take longest, so they come first."""
-    names = {case.engine for case in cases}
-    compiling = {name for name in names if getattr(engine(name), "compiles", False)}
-    return {(case.engine, case.method): case for case in reversed(cases) if case.engine in compiling}.values()
+def _of_compiling_engines(cases: Sequence[Case]) -> Iterable[tuple[Case, ...]]:
+    """For each engine that says that it compiles a case of each of its methods; they take longest, so they come first."""
+    first = {(case.engine, case.method): case for case in reversed(cases)}
+    for name in sorted({case.engine for case in cases}):
+        if getattr(engine(name), "compiles", False):
+            yield tuple(case for case in first.values() if case.engine == name)
