@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 from pendbench.base import compiled
@@ -319,6 +320,7 @@ def test_plugin_s_kernels_are_neither_stale_nor_in_the_way_of_others(tmp_path, m
     assert run(USE_CHAIN, cache) == 0.5
 
 
+@pytest.mark.skipif(numba.version_info.short != compiled.LINKED_WITH, reason="numba compiles parts in its own way")
 def test_no_machine_code_is_made_of_what_others_take_in(tmp_path, monkeypatch):
     """And they take it in as well when it comes from the cache."""
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -76,8 +76,13 @@ class _ForOthers(Compiler):
         return super().compile_extra(func)  # type: ignore[no-untyped-call]
 
 
+#: `_Linked` builds on what numba does not promise to keep, so it is used with the version that it was tried with. With
+#: any other, parts are compiled as everything is.
+LINKED_WITH = (0, 68)
+_COMPILER = _ForOthers if numba.version_info.short == LINKED_WITH else Compiler
+
 #: Such a kernel cannot be called but by others: what Python would need is a tenth of the time to compile it.
-_PART: Any = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": _ForOthers}
+_PART: Any = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": _COMPILER}
 _INLINED: Any = {**_PART, "forceinline": True}
 
 _IMPORT = re.compile(r"^[ \t]*(?:from|import)[ \t]+([\w.]+)(?=(.*?)(?:\n[ \t]*\n|\Z))", re.DOTALL | re.MULTILINE)
