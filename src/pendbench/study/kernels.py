@@ -78,7 +78,7 @@ def compile_kernels(runner: Runner, scenes: Iterable[Scene], cases: Iterable[Cas
 
 
 def _of_compiling_engines(cases: Sequence[Case]) -> Iterable[tuple[Case, ...]]:
-    """For each engine that says that it compiles a case of each of its methods; they take longest, so they come first."""
+    """A case of each method of each engine that says that it compiles; such take longest, so they come first."""
     first = {(case.engine, case.method): case for case in reversed(cases)}
     for name in sorted({case.engine for case in cases}):
         if getattr(engine(name), "compiles", False):
