@@ -229,19 +229,19 @@ def descend(chain: Chain, room: Room, angles: FloatArray) -> None:
     rows, n = room.rows, len(angles)
     for i in range(n):
         rows[GUESS, i] = rows[ANGLE, i]
-    energy = _misfit(chain, rows, n)
-    added = energy / chain.lengths.sum()
+    misfit = _misfit(chain, rows, n)
+    added = misfit / chain.lengths.sum()
     for _ in range(_MOST_DESCENTS):
         _write_tensions(chain, rows, n)
         for i in range(n):
             rows[SPARE, i] = rows[ANGLE, i]
             rows[PULL, i] += added
-        worst, before = _iterate(chain, room, angles, 1.0), energy
-        energy = _misfit(chain, rows, n)
-        if not energy <= before:
+        worst, before = _iterate(chain, room, angles, 1.0), misfit
+        misfit = _misfit(chain, rows, n)
+        if not misfit <= before:
             for i in range(n):
                 rows[ANGLE, i] = rows[SPARE, i]
-            energy, added = _misfit(chain, rows, n), 9.0 * added
+            misfit, added = _misfit(chain, rows, n), 9.0 * added
         elif worst < _NEAR:
             break
         elif not _SMALL < worst < _FAR:
