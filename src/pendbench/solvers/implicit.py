@@ -54,7 +54,7 @@ MOST_FOR_A_MISS = 4
 PAYS = 0.6
 
 #: How far, in lengths of the chain, a step of `bdf2` may take a point from where the motion before would.
-FAR_OFF = 3e-4
+FAR_OFF = 2.5e-4
 
 #: How many steps are of order 1 after one of order 2 has no solution.
 CALMING = 6
