@@ -13,9 +13,9 @@ from pendbench.physics.kernels.scratch import ACROSS, COSINE, OWN, PASSED, TENSI
 from pendbench.physics.kernels.system import System
 from pendbench.solvers.trigonometry import direction, write_bends
 
-# The elimination's fractions are reduced where they have become large. To ask at every fourth link will do: each link
-# multiplies them by 1 + the ratio of two masses, and four of these make 1e200 at most, since masses end at 1e50.
-_LINKS_BETWEEN, _LARGE = 4, 1e20
+#: The elimination's fractions are reduced where they have become large. To ask at every fourth link will do: each link
+#: multiplies them by 1 + the ratio of two masses, and four of these make 1e200 at most, since masses end at 1e50.
+LINKS_BETWEEN, LARGE = 4, 1e20
 
 
 @inlined
@@ -31,7 +31,7 @@ def _past_joint(
 @inlined
 def _reduced(whole: float, loose: float, moving: float) -> tuple[float, float, float]:
     """The same fractions, over one where they have become large."""
-    share = 1.0 / whole if whole > _LARGE else 1.0
+    share = 1.0 / whole if whole > LARGE else 1.0
     return whole * share, loose * share, moving * share
 
 
@@ -53,8 +53,8 @@ def write_tensions(system: System, omega: FloatArray, moving: float) -> None:
         scratch[OWN, i], scratch[PASSED, i] = moving_out, c * whole_out
         whole_out, loose_out, moving_out = _past_joint(c, s, from_tip[i], whirl, whole_out, loose_out, moving_out)
         scratch[WHOLE, i] = whole_out
-    for start in range(0, middle, _LINKS_BETWEEN):
-        for k in range(start, min(start + _LINKS_BETWEEN, middle)):
+    for start in range(0, middle, LINKS_BETWEEN):
+        for k in range(start, min(start + LINKS_BETWEEN, middle)):
             c, s, whirl = scratch[COSINE, k], scratch[ACROSS, k], lengths[k + 1] * omega[k + 1] ** 2
             scratch[OWN, k], scratch[PASSED, k] = moving, c * whole
             whole, loose, moving = _past_joint(c, s, from_pivot[k], whirl, whole, loose, moving)

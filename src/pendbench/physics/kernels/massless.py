@@ -9,6 +9,7 @@ from __future__ import annotations
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import inlined
 from pendbench.physics.kernels import forces, laws
+from pendbench.physics.kernels.both_ends import LARGE, LINKS_BETWEEN
 from pendbench.physics.kernels.scratch import (
     ACROSS,
     COSINE,
@@ -22,10 +23,6 @@ from pendbench.physics.kernels.scratch import (
 )
 from pendbench.physics.kernels.system import System
 from pendbench.solvers.trigonometry import direction, write_bends
-
-# The elimination's fractions are reduced where they have become large. To ask at every fourth link will do: each link
-# multiplies them by 1 + the ratio of two masses, and four of these make 1e200 at most, since masses end at 1e50.
-_LINKS_BETWEEN, _LARGE = 4, 1e20
 
 
 @inlined
@@ -47,8 +44,8 @@ def inwards(system: System, t: float, theta: FloatArray, omega: FloatArray) -> t
     whole, loose, moving = 1.0, 1.0, lengths[tip] * omega[tip] ** 2
     forces.write_forces(system, t, theta, omega, COSINE, ACROSS)
     scratch[HELD, tip] = scratch[FORCE_ACROSS, tip]
-    for last in range(tip, 0, -_LINKS_BETWEEN):
-        for i in range(last - 1, max(last - _LINKS_BETWEEN, 0) - 1, -1):
+    for last in range(tip, 0, -LINKS_BETWEEN):
+        for i in range(last - 1, max(last - LINKS_BETWEEN, 0) - 1, -1):
             c, s = scratch[COSINE, i], scratch[ACROSS, i]
             scratch[OWN, i], scratch[PASSED, i] = masses[i] * moving, c * whole
             scratch[ACROSS, i] = s * system.inverse_masses[i]
@@ -62,7 +59,7 @@ def inwards(system: System, t: float, theta: FloatArray, omega: FloatArray) -> t
             whole = whole + heavier
             moving = c * moving + lengths[i] * omega[i] ** 2 * whole
             scratch[WHOLE, i] = whole
-        if whole > _LARGE:
+        if whole > LARGE:
             share = 1.0 / whole
             whole, loose, moving = 1.0, loose * share, moving * share
     for i in range(tip):
