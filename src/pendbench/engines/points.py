@@ -7,7 +7,7 @@ import numpy as np
 from pendbench.base.arrays import FloatArray
 from pendbench.engines.protocol import State
 from pendbench.physics import acting
-from pendbench.physics.geometry import TURN, positions, velocities
+from pendbench.physics.geometry import TURN, positions, rod_vectors, velocities
 from pendbench.scene.scene import Scene
 
 
@@ -19,8 +19,7 @@ def start_of(scene: Scene) -> tuple[FloatArray, FloatArray]:
 def state_of(lengths: FloatArray, places: FloatArray, speeds: FloatArray) -> State:
     """What places (n, 2) m and speeds (n, 2) m/s say of the rods; angles in (-pi, pi]."""
     with np.errstate(all="ignore"):
-        x, y = np.diff(places, axis=0, prepend=np.zeros((1, 2))).T
-        u, v = np.diff(speeds, axis=0, prepend=np.zeros((1, 2))).T
+        (x, y), (u, v) = rod_vectors(places).T, rod_vectors(speeds).T
         found = np.hypot(x, y)
         gap = float(np.abs(found / lengths - 1.0).max())
         return State(np.arctan2(x, -y), (x / found * v - y / found * u) / found, gap)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendbench import __version__
-from pendbench.base.arrays import FloatArray
+from pendbench.base.arrays import FloatArray, all_finite
 from pendbench.base.errors import InputError, choose, describe, printable
 from pendbench.base.faults import STATUSES, Fault
 from pendbench.base.ranges import rising_times
@@ -138,31 +138,34 @@ def _maker(asked: Asked) -> Maker:
 def _fill(samples: Samples, asked: Asked) -> Fault | None:
     with uncounted():  # engines that compile for each scene do it here
         run = asked.engine.build(asked.scene, asked.method, asked.dt, **asked.settings)
-    most = max(1, _LINKS_A_CALL // asked.scene.n)
-    for i, time in enumerate(asked.times):
-        if asked.steps is None:
-            samples.steps += _advance_to(run, float(time))
-        else:
-            samples.steps += _advance(run, int(asked.steps[i]) - samples.steps, most)
-        fault = fault_of(run) or samples.add(float(time), run.state())
+    for time, taken in zip(asked.times.tolist(), _advanced(run, asked), strict=True):
+        samples.steps += taken
+        fault = fault_of(run) or samples.add(time, run.state())
         if fault is not None:
             return fault
     return None
 
 
-def _advance(run: Simulation | AdaptiveSimulation, steps: int, most: int) -> int:
-    """Take the steps, `most` in a call: an engine at work in another language does not hear an interrupt."""
+def _advanced(run: Simulation | AdaptiveSimulation, asked: Asked) -> Iterator[int]:
+    """Advance to each of the times asked for, and say how many steps that took."""
+    if asked.steps is None:
+        if not isinstance(run, AdaptiveSimulation):
+            raise TypeError("an adaptive run has no advance_to()")
+        for time in asked.times.tolist():
+            yield int(run.advance_to(time)) if time > 0.0 else 0
+        return
     if not isinstance(run, Simulation):
         raise TypeError("a run with a fixed step has no advance()")
+    most = max(1, _LINKS_A_CALL // asked.scene.n)
+    for steps in np.diff(asked.steps, prepend=0).tolist():
+        _advance(run, steps, most)
+        yield steps
+
+
+def _advance(run: Simulation, steps: int, most: int) -> None:
+    """Take the steps, `most` in a call: an engine at work in another language does not hear an interrupt."""
     for taken in range(0, steps, most):
         run.advance(min(most, steps - taken))
-    return steps
-
-
-def _advance_to(run: Simulation | AdaptiveSimulation, time: float) -> int:
-    if not isinstance(run, AdaptiveSimulation):
-        raise TypeError("an adaptive run has no advance_to()")
-    return int(run.advance_to(time)) if time > 0.0 else 0
 
 
 def fault_of(run: Simulation | AdaptiveSimulation) -> Fault | None:
@@ -190,7 +193,7 @@ class Samples:
         if theta.shape != (self.n,) or omega.shape != (self.n,):
             shapes = f"theta {theta.shape} and omega {omega.shape}"
             return Fault("error", f"state() gave {shapes}; a chain of {self.n} has ({self.n},)")
-        if not (np.all(np.isfinite(theta)) and np.all(np.isfinite(omega))):
+        if not all_finite(theta, omega):
             return Fault("not finite", f"an angle or a rate is not finite at t = {time:.6g} s")
         self._t.append(time)
         self._states.append(State(theta.copy(), omega.copy(), float(state.gap)))

@@ -23,6 +23,13 @@ def velocities(lengths: FloatArray, theta: FloatArray, omega: FloatArray) -> Flo
     return np.cumsum(np.stack([speeds * np.cos(theta), speeds * np.sin(theta)], axis=-1), axis=-2)
 
 
+def rod_vectors(places: FloatArray) -> FloatArray:
+    """The vector along each rod (n, 2) m, from the masses' places (n, 2) m; of their speeds, how fast it changes."""
+    rods = places.copy()
+    rods[1:] -= places[:-1]
+    return rods
+
+
 def distance(lengths: FloatArray, theta: FloatArray, delta: FloatArray) -> FloatArray:
     """How far apart two chains are, (...,): max_i |r_i(theta + delta) - r_i(theta)| / L. equations.md (E22).
 

@@ -7,11 +7,11 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from pendbench.base.arrays import FloatArray
+from pendbench.base.arrays import FloatArray, all_finite
 from pendbench.base.faults import Fault
 from pendbench.engines.protocol import State
 from pendbench.physics.acting import check_plain
-from pendbench.physics.geometry import positions, velocities
+from pendbench.physics.geometry import positions, rod_vectors, velocities
 from pendbench.physics.kernels.system import RotorSystem
 from pendbench.physics.kernels.table import momenta_of, rates_of, series_system_of, system_of
 from pendbench.scene.scene import Scene
@@ -24,9 +24,7 @@ from pendbench.solvers.rattle import rods_of
 
 
 def _finite(*arrays: FloatArray) -> Fault | None:
-    if all(np.all(np.isfinite(array)) for array in arrays):
-        return None
-    return Fault("not finite", "an angle or a rate is not finite")
+    return None if all_finite(*arrays) else Fault("not finite", "an angle or a rate is not finite")
 
 
 def _given_up(how: int, t: float) -> Fault | None:
@@ -91,11 +89,8 @@ class _Ends:
         self._start = State(scene.angles.copy(), scene.rates.copy())
         self.state.turns[:] = np.round((scene.angles - self._directions()) / (2 * np.pi))
 
-    def _rods_now(self) -> FloatArray:
-        return np.diff(self.state.points, axis=0, prepend=np.zeros((1, 2)))
-
     def _directions(self) -> FloatArray:
-        rods = self._rods_now()
+        rods = rod_vectors(self.state.points)
         return np.arctan2(rods[:, 0], -rods[:, 1])
 
     def now(self, taken: int) -> State:
@@ -103,9 +98,9 @@ class _Ends:
         if taken == 0:
             return State(self._start.theta.copy(), self._start.omega.copy())
         theta = self._directions() + 2 * np.pi * self.state.turns
-        relative = np.diff(self.state.speeds, axis=0, prepend=np.zeros((1, 2)))
+        relative = rod_vectors(self.state.speeds)
         omega = (np.cos(theta) * relative[:, 0] + np.sin(theta) * relative[:, 1]) / self.system.lengths
-        gap = np.abs(np.hypot(*self._rods_now().T) / self.system.lengths - 1).max()
+        gap = np.abs(np.hypot(*rod_vectors(self.state.points).T) / self.system.lengths - 1).max()
         return State(theta, omega, float(gap))
 
 
@@ -180,8 +175,8 @@ class Adaptive:
 
     def state(self) -> State:
         """The state now."""
-        theta, omega = np.split(self._y.value, 2)
-        return State(theta.copy(), omega.copy())
+        n, value = len(self._y.value) // 2, self._y.value
+        return State(value[:n].copy(), value[n:].copy())
 
     def health(self) -> Fault | None:
         """Whether it is finite and within its limits."""

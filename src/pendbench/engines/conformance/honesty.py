@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from pendbench.base.arrays import FloatArray
+from pendbench.base.arrays import FloatArray, all_finite
 from pendbench.base.faults import STATUSES, Fault
 from pendbench.base.strict import show
 from pendbench.engines.conformance.chains import (
@@ -56,7 +56,7 @@ def owns_up(its: Subject) -> Iterator[Reading]:
             yield from map(broken, flaws) if flaws else [kept()]
             return
         state = run.state()
-        if not (np.all(np.isfinite(state.theta)) and np.all(np.isfinite(state.omega))):
+        if not all_finite(state.theta, state.omega):
             yield broken("the state is not finite, and health() says nothing")
             return
         if isinstance(run, Simulation) and not its.engine.methods[its.method].substeps:

@@ -8,9 +8,11 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from pendbench.base.arrays import all_finite
 from pendbench.base.faults import Fault
 from pendbench.scene.models.alone import alone
 
+_EPSILON: Final = float(np.finfo(float).eps)
 _MOST_STEPS_A_CALL: Final = 2**30  # the count of a native call has 32 bits
 
 
@@ -31,7 +33,7 @@ class Run:
                 steps -= _MOST_STEPS_A_CALL
 
     def health(self) -> Fault | None:
-        if not (np.all(np.isfinite(self._data.qpos)) and np.all(np.isfinite(self._data.qvel))):
+        if not all_finite(self._data.qpos, self._data.qvel):
             return Fault("not finite", "a joint's angle or rate is not finite")
         return self._reset() or self._warned()
 
@@ -39,7 +41,7 @@ class Run:
         """A run that blows up starts again at time 0, unless told not to: its clock is then behind."""
         time, expected = self._data.time, self._taken * self._model.opt.timestep
         # The clock is a sum of steps: its rounding grows with their number squared, at worst.
-        slack = self._model.opt.timestep * max(0.5, np.finfo(float).eps * self._taken**2)
+        slack = self._model.opt.timestep * max(0.5, _EPSILON * self._taken**2)
         if abs(time - expected) <= slack:
             return None
         return Fault("reset", f"its clock says {time:.6g} s after {expected:.6g} s of steps")

@@ -16,6 +16,7 @@ import pymunk
 from pymunk import batch
 
 from pendbench.base.faults import Fault
+from pendbench.engines.points import Turns, state_of
 from pendbench.engines.protocol import Mapped, Method, Setting, Simulation, State, needed_step
 from pendbench.engines.pymunk.bodies import BodiesRun
 from pendbench.engines.pymunk.forces import Forces
@@ -68,7 +69,7 @@ class _Run:
         self._hang(scene, tuned)
         self._buffer = batch.Buffer()
         self._taken = 0
-        self._read_at, self._read = 0.0, State(scene.angles, scene.rates)
+        self._turns = Turns(scene)
 
     def _hang(self, scene: Scene, tuned: Tuning | None) -> None:
         directions = np.stack([np.sin(scene.angles), -np.cos(scene.angles)], axis=1)
@@ -97,18 +98,7 @@ class _Run:
         self._taken += steps
 
     def state(self) -> State:
-        """Angles are followed by whole turns from the last state read, with the mean of the rates then and now.
-
-        That is right while this predicts each angle to better than half a turn, so for samples much closer than a
-        turn's acceleration takes. Sampled more coarsely, an angle is known up to whole turns, which no position and
-        no energy depends on.
-        """
-        found, time = self._measure(), self._taken * self._dt
-        with np.errstate(all="ignore"):
-            expected = self._read.theta + 0.5 * (time - self._read_at) * (self._read.omega + found.omega)
-            theta = found.theta + 2.0 * np.pi * np.rint((expected - found.theta) / (2.0 * np.pi))
-        self._read_at, self._read = time, State(theta, found.omega, found.gap)
-        return State(theta.copy(), found.omega.copy(), found.gap)
+        return self._turns.follow(self._measure(), self._taken * self._dt)
 
     def health(self) -> Fault | None:
         """Whether it is finite, its joints whole, and its iterations enough."""
@@ -121,13 +111,8 @@ class _Run:
         # In the order in which they were added; the static body, where it has a row, comes last.
         bodies = np.frombuffer(self._buffer.float_buf()).reshape(-1, 4)[: self._n]
         with np.errstate(all="ignore"):
-            positions, velocities = bodies[:, :2] + self._ahead * bodies[:, 2:], bodies[:, 2:]
-            x, y = np.diff(positions, axis=0, prepend=0.0).T
-            u, v = np.diff(velocities, axis=0, prepend=0.0).T
-            found = np.hypot(x, y)
-            rates = (x / found * v - y / found * u) / found
-            gap = np.abs(found / self._lengths - 1.0).max()
-            return State(np.arctan2(x, -y), rates, float(gap))
+            places = bodies[:, :2] + self._ahead * bodies[:, 2:]
+        return state_of(self._lengths, places, bodies[:, 2:])
 
 
 class PymunkEngine:

@@ -12,7 +12,7 @@ import pymunk
 
 from pendbench.base.arrays import FloatArray
 from pendbench.physics import acting
-from pendbench.physics.geometry import wrapped
+from pendbench.physics.geometry import rod_vectors, wrapped
 from pendbench.scene.scene import Scene
 
 
@@ -45,8 +45,7 @@ class Forces:
     def _on_masses(self, t: float, places: FloatArray, speeds: FloatArray) -> FloatArray:
         """The forces (n, 2) N at places (n, 2) m and speeds (n, 2) m/s."""
         with np.errstate(all="ignore"):
-            x, y = np.diff(places, axis=0, prepend=0.0).T
-            u, v = np.diff(speeds, axis=0, prepend=0.0).T
+            (x, y), (u, v) = rod_vectors(places).T, rod_vectors(speeds).T
             self._theta = self._theta + wrapped(np.arctan2(x, -y) - self._theta)
             omega = (x * v - y * u) / (x * x + y * y)
             return acting.mass_forces(self._scene, t, self._theta, omega)

@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pendbench.base.arrays import FloatArray
+from pendbench.base.arrays import FloatArray, all_finite
 from pendbench.base.faults import Fault
 from pendbench.engines.protocol import State
 from pendbench.physics import acting
@@ -124,7 +124,7 @@ class Joints:
 
     def fault(self, state: State) -> Fault | None:
         """Of the state that a run has come to; the fastest turning so far is remembered."""
-        if not (np.all(np.isfinite(state.theta)) and np.all(np.isfinite(state.omega))):
+        if not all_finite(state.theta, state.omega):
             return Fault("not finite", "a position or a velocity is not finite")
         if state.gap > _TORN:
             return Fault("torn", f"a joint is open by {state.gap:.3g} of its rod's length")
