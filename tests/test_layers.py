@@ -51,6 +51,7 @@ ONLY = {
         "base.arrays",
         "base.faults",
         "engines.joints",
+        "engines.points",
         "engines.protocol",
         "physics.acting",
         "physics.geometry",
