@@ -240,6 +240,27 @@ def test_a_descent_ends_where_the_masses_are_nearest(seed: int) -> None:
     assert misfit(found) == pytest.approx(nearby.fun, rel=1e-8)
 
 
+@pytest.mark.parametrize("n", [1, 2, 10])
+def test_a_descent_comes_from_as_far_as_one_likes(n: int) -> None:
+    """From masses that would be a hundred thousand lengths away without pulls."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        its = Rods(rope(n), "implicit_euler")
+        rows, guess = its.state.room.rows, rng.uniform(-3.0, 3.0, n)
+        rows[[closing.WANTED_X, closing.WANTED_Y], :n] = 1e5 * rng.normal(size=(2, n))
+        rows[closing.ANGLE, :n], rows[closing.PULL, :n] = guess, 0.0
+        closing.descend(its.chain, its.state.room, guess)
+        assert closing.close(its.chain, its.state.room, guess, 1.0, 1e-9)
+
+
+@pytest.mark.parametrize("method", DAMPED)
+def test_a_step_that_is_as_long_as_one_likes_ends_where_the_chain_hangs(method: str) -> None:
+    run = simulate(chain(2), "analytic", method, 1e4, [0.0, 1e4])
+    assert run.status == "ok", run.reason
+    np.testing.assert_allclose(np.sin(run.theta[-1]), 0.0, atol=1e-2)
+    assert np.all(np.cos(run.theta[-1]) > 0.0)
+
+
 @pytest.mark.parametrize("method", DAMPED)
 def test_links_that_whirl_faster_than_any_step_follows_are_passed(method: str) -> None:
     """Neighbours that turn against each other by a million turns a step: no part of it closes from a guess."""

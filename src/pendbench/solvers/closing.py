@@ -208,13 +208,18 @@ def _misfit(chain: Chain, rows: FloatArray, n: int) -> float:
 
 
 @inlined
-def _write_tensions(chain: Chain, rows: FloatArray, n: int) -> None:
-    """The pulls that the misfit asks for along the rods, where they are tensions: these make the descent convex."""
-    x, y = 0.0, 0.0
+def _write_tensions(chain: Chain, rows: FloatArray, n: int) -> float:
+    """The pulls that the misfit asks for along the rods, where they are tensions: these make the descent convex.
+
+    Returns the largest pull that it asks for in any direction, kg m.
+    """
+    x, y, most = 0.0, 0.0, 0.0
     for i in range(n - 1, -1, -1):
         x -= rows[FORCE_X, i + 1] / chain.couplings[i + 1]
         y -= rows[FORCE_Y, i + 1] / chain.couplings[i + 1]
         rows[PULL, i] = max(0.0, x * rows[ROD_X, i] + y * rows[ROD_Y, i])
+        most = max(most, x * x + y * y)
+    return float(np.sqrt(most))
 
 
 @compiled
@@ -230,7 +235,9 @@ def descend(chain: Chain, room: Room, angles: FloatArray) -> None:
     for i in range(n):
         rows[GUESS, i] = rows[ANGLE, i]
     misfit = _misfit(chain, rows, n)
-    added = misfit / chain.lengths.sum()
+    # No more than any pull: far from where masses would be, the misfit grows with the square of how far, pulls do not,
+    # and so much added would keep the first step as small as the last.
+    added = min(misfit / chain.lengths.sum(), _write_tensions(chain, rows, n))
     for _ in range(_MOST_DESCENTS):
         _write_tensions(chain, rows, n)
         for i in range(n):
