@@ -7,6 +7,7 @@ how soon it answers.
 from __future__ import annotations
 
 import pkgutil
+import re
 import signal
 import subprocess
 import sys
@@ -63,6 +64,9 @@ LONG = {
     "pymunk": "pb.simulate(plain, 'pymunk', 'default', 1e-3, [end])",
     "pinocchio": "pb.simulate(plain, 'pinocchio', 'rk4', 1e-3, [end])",
     "heyoka": "pb.simulate(plain, 'heyoka', 'taylor', times=[end], most_steps=1e15)",
+    "exudyn": "pb.simulate(plain, 'exudyn', 'dopri5', times=[end])",
+    "exudyn with effects": "pb.simulate(damped, 'exudyn', 'dopri5', times=[end])",
+    "exudyn, fixed step": "pb.simulate(damped, 'exudyn', 'rk4', 1e-3, [end])",
     "ensemble": "pb.simulate_ensemble(plain, np.full((64, 1), 0.5), times=[end], most_steps=10**15)",
     "ensemble, fixed step": "pb.simulate_ensemble(plain, [[0.5]], method='rk4', dt=1e-3, times=[min(end, 1e6)])",
     "flips": "pb.first_flips(pb.Scene('p', 'p', end, one, one, one, one, plain.effects), [[0.5]], most_steps=10**15)",
@@ -71,8 +75,9 @@ LONG = {
 
 @pytest.mark.parametrize("work", LONG)
 def test_an_interrupt_is_caught_and_what_it_stopped_can_be_begun_again(work):
-    if work in ("mujoco", "pymunk", "pinocchio", "heyoka") and work not in installed_engines():
-        pytest.skip(f"{work} is not installed")
+    engine = re.split("[ ,]", work)[0]
+    if engine in ("mujoco", "pymunk", "pinocchio", "heyoka", "exudyn") and engine not in installed_engines():
+        pytest.skip(f"{engine} is not installed")
     child = subprocess.Popen(
         [sys.executable, "-c", CHILD.format(work=LONG[work])], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

@@ -237,3 +237,5 @@ def test_exudyn_evaluates_a_drive_at_its_time():
     driven = dataclasses.replace(chain(1, angle=0.0), effects=Effects(drive_torque=drive))
     found = run("exudyn", "rk4", driven, 1e-2, 100).state().theta[0]
     assert found == pytest.approx(1.0 / (2.0 * math.pi), rel=1e-6)
+    found = pb.simulate(driven, "exudyn", "dopri5", None, [0.2, 0.3, 0.7, 1.0]).theta[-1, 0]  # in four calls of Exudyn
+    assert found == pytest.approx(1.0 / (2.0 * math.pi), rel=1e-6)

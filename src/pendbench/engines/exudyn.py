@@ -12,7 +12,8 @@ nothing of the last: each advance is a call of its own, from the state that the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Final, NamedTuple
 
 import exudyn
@@ -132,6 +133,17 @@ class _Chain:
             return State(absolute_values(np.array(q)), absolute_values(np.array(v)))
 
 
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Exudyn makes an error of an interrupt that comes while it is at work, or in a user function: it is one again."""
+    try:
+        yield
+    except Exception as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            raise KeyboardInterrupt from error
+        raise
+
+
 class _Stepped:
     """A run with a fixed step."""
 
@@ -147,14 +159,15 @@ class _Stepped:
 
     def advance(self, steps: int) -> None:
         mbs, settings, solver = self._chain.mbs, self._settings, self._solver
-        for _ in range(steps):
-            if self._failed:
-                return
-            mbs.systemData.SetTime(self._taken * self._dt, _START)  # the explicit solvers leave that to `SolveSteps`
-            solver.InitializeStep(mbs, settings)
-            self._failed = not solver.DiscontinuousIteration(mbs, settings)
-            solver.FinishStep(mbs, settings)
-            self._taken += 1
+        with _interruptible():
+            for _ in range(steps):
+                if self._failed:
+                    return
+                mbs.systemData.SetTime(self._taken * self._dt, _START)  # the explicit ones leave that to `SolveSteps`
+                solver.InitializeStep(mbs, settings)
+                self._failed = not solver.DiscontinuousIteration(mbs, settings)
+                solver.FinishStep(mbs, settings)
+                self._taken += 1
 
     def health(self) -> Fault | None:
         if fault := not_finite(self.state()):
@@ -181,7 +194,8 @@ class _Chosen:
         chosen.startTime, chosen.endTime = self._time, time
         chosen.initialStepSize = min(_FIRST_STEP, time - self._time)
         solver, data = exudyn.MainSolverExplicit(), self._chain.mbs.systemData
-        self._failed = not solver.SolveSystem(self._chain.mbs, self._settings)
+        with _interruptible():
+            self._failed = not solver.SolveSystem(self._chain.mbs, self._settings)
         data.SetODE2Coordinates(data.GetODE2Coordinates(), _INITIAL)
         data.SetODE2Coordinates_t(data.GetODE2Coordinates_t(), _INITIAL)
         data.SetTime(time, _INITIAL)
