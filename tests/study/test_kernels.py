@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+from pendbench.base.errors import InputError
 from pendbench.execution import limits
 from pendbench.study import kernels
 from pendbench.study.case import Case
@@ -35,3 +36,18 @@ def test_what_an_engine_compiles_does_not_count_against_the_limit_of_its_job(mon
     [(stopped, settings)] = left
     assert 0.0 < stopped[0] < 61.0
     assert settings == {"flag": 1}
+
+
+def test_an_engine_that_does_not_take_a_case_ends_no_study(monkeypatch):
+    """What raises InputError in a worker does. Its other methods are begun all the same."""
+    begun = []
+
+    def build(_, method, __):
+        begun.append(method)
+        if method == "steel":
+            raise InputError("no such thing")
+
+    monkeypatch.setattr(kernels, "engine", lambda _: SimpleNamespace(build=build))
+    cases = tuple(Case(chain(2), "newton", method, 0.1) for method in ("steel", "featherstone"))
+    assert compile_engine(cases) == Compiled("refused", "no such thing")
+    assert begun == ["steel", "featherstone"]
