@@ -12,11 +12,12 @@ from pendbench.base.faults import STATUSES
 from pendbench.physics.exact import single_pendulum
 from pendbench.physics.kernels.table import system_of
 from pendbench.scene.scene import load_scene
-from pendbench.solvers.adaptive import integrate
+from pendbench.solvers.adaptive import _Room, _scaled_error, integrate
 from pendbench.solvers.compensated import sum_from
 from pendbench.solvers.control import FIRST_STEP, Limits
 from pendbench.solvers.dop853 import DOP853
 from pendbench.solvers.outcome import DONE, NOT_FINITE, REASONS, TOO_MANY, TOO_SMALL
+from support.kernels import called
 from support.scenes import chain
 from support.systems import Growth, Oscillator, order
 
@@ -185,3 +186,14 @@ def test_compensated_summation_keeps_what_one_step_cannot_show():
         run.to(end, t, h=1.0)
     np.testing.assert_allclose(run.y - 1000.0, steps * 0.1 * digit, rtol=0, atol=digit)
     assert abs((run.y[0] - 1000.0) + run.carry[0] - times[-1]) < 1e-3 * digit
+
+
+@pytest.mark.parametrize("lost", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("d", [1, 4, 7])
+def test_no_component_whose_error_is_unknown_is_passed_over(d, lost):
+    """Or a step would be taken that should be tried again with a shorter one."""
+    for i in range(d):
+        room = _Room(np.zeros((len(DOP853.b), d)), np.ones(d), np.empty(d), np.empty(d))
+        assert called(_scaled_error)(DOP853, 1.0, room) == 0.0
+        room.k[7, i] = lost
+        assert called(_scaled_error)(DOP853, 1.0, room) == np.inf
