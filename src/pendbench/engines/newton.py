@@ -2,9 +2,9 @@
 
 All numbers are of single precision, and nothing has to be switched off: Featherstone's angular damping of 0.05 is a
 setting that no kernel of it reads, and limits of the joints have no stiffness here. A step is some launches of kernels
-from Python, and the first one compiles for minutes, unless Warp has them in its cache.
+from Python, and the first one compiles for half a minute, unless Warp has them in its cache.
 
-Newton's other solvers do not hold a chain of points, as docs/engines.md says of each.
+Newton's other solvers are no methods: docs/engines.md says of each why.
 """
 
 from __future__ import annotations
