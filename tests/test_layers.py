@@ -73,7 +73,7 @@ ONLY = {
     "engines.drake": {"base", *JOINTED, "physics.acting", "scene"},
     "engines.exudyn": {"base", *JOINTED, "physics.acting", "scene"},
     "engines.pybullet": {"base.arrays", *JOINTED, "engines.silence", "scene"},
-    "engines.mjx": {"base.faults", "engines.joints", "engines.mujoco", "engines.protocol", "scene"},
+    "engines.mjx": {"base.faults", "base.files", "engines.joints", "engines.mujoco", "engines.protocol", "scene"},
     "engines.newton": {"base.arrays", *JOINTED, "engines.silence", "physics.acting", "scene"},
     "engines.rapier": {
         "base.faults",

@@ -30,6 +30,8 @@ from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.extending import overload
 
+from pendbench.base.files import user_cache
+
 config: Any = numba_config  # its attributes are set while it is imported
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -157,7 +159,7 @@ def _digest(source: Path, outside: tuple[Path, ...]) -> str:
 def _home() -> Path:
     """A folder below NUMBA_CACHE_DIR or the user's cache; where that cannot be, one for this process only."""
     try:
-        home = Path(config.CACHE_DIR or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "pendbench"
+        home = Path(config.CACHE_DIR) / "pendbench" if config.CACHE_DIR else user_cache()
         home.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=home).close()
     except (OSError, RuntimeError):  # RuntimeError: this user has no home

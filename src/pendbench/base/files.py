@@ -14,6 +14,11 @@ from pendbench.base.errors import InputError
 from pendbench.base.strict import show, shown_path
 
 
+def user_cache() -> Path:
+    """Where what can be made again is kept for this user. Raises RuntimeError for one without a home."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "pendbench"
+
+
 def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Write a file so that it is there whole or not at all, whenever the program stops.
 

@@ -1,7 +1,8 @@
 """MJX as an engine: MuJoCo's equations in JAX, compiled for each chain, many steps in one call.
 
 JAX computes in single precision unless it is told otherwise. `euler_single` takes MJX as it comes; the other methods
-tell JAX to use doubles, for their own calls alone. Compiling takes from seconds to a minute for each number of links.
+tell JAX to use doubles, for their own calls alone. Compiling takes from seconds to a minute for each number of links;
+what is compiled is kept in the user's cache, unless JAX was told to keep it elsewhere.
 
 There is no callback in Python from compiled code: what MuJoCo has no law for (drag, motors, driven pivots) is refused.
 """
@@ -19,6 +20,7 @@ import numpy as np
 from mujoco import mjx
 
 from pendbench.base.faults import Fault
+from pendbench.base.files import user_cache
 from pendbench.engines.joints import absolute_values, joint_values
 from pendbench.engines.mujoco.forces import constant_torques
 from pendbench.engines.mujoco.mjcf import compile_chain
@@ -57,6 +59,8 @@ _MOST_LINKS: Final = 100  # JAX unrolls the tree: compiling grows with it
 @cache
 def _advanced() -> Any:
     """Steps in one call; compiled anew for each shape and precision."""
+    if jax.config.jax_compilation_cache_dir is None:
+        jax.config.update("jax_compilation_cache_dir", str(user_cache() / "jax"))
     return jax.jit(lambda model, data, steps: jax.lax.fori_loop(0, steps, lambda _, d: mjx.step(model, d), data))
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Final
 
 from pendbench.base.errors import InputError, printable
-from pendbench.base.files import alone_in, write_whole
+from pendbench.base.files import alone_in, user_cache, write_whole
 
 #: After so long, s, an installation is taken to hang.
 _INSTALLING_S: Final = 900.0
@@ -43,7 +43,7 @@ class Environment:
 
 def folder_of_environments() -> Path:
     """Where environments are kept: in the user's cache."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "pendbench" / "environments"
+    return user_cache() / "environments"
 
 
 def check_installer() -> None:
