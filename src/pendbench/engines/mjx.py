@@ -74,11 +74,13 @@ class _Run:
         self._doubles = not _METHODS[method].single
         with jax.enable_x64(self._doubles):
             self._model = mjx.put_model(compiled)
-            self._data = mjx.make_data(self._model).replace(
+            start = mjx.make_data(self._model).replace(
                 qpos=jax.numpy.array(joint_values(scene.angles)),
                 qvel=jax.numpy.array(joint_values(scene.rates)),
                 qfrc_applied=jax.numpy.array(constant_torques(scene)),
             )
+            # Bound to a device, as what comes back is: the second call would compile everything once more.
+            self._data = jax.device_put(start, jax.devices()[0])
         self.advance(0)  # compiles, which is no part of a step
 
     def advance(self, steps: int) -> None:
