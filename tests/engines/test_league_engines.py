@@ -199,7 +199,7 @@ def test_the_two_solvers_of_newton_are_the_same_method_and_no_damping_is_on():
     ends = [run("newton", method, scene, 1 / 256, 256).state().theta for method in ("featherstone", "steel")]
     assert np.abs(ends[0] - ends[1]).max() < 1e-5  # single precision
     euler = run("mujoco", "euler", scene, 1 / 256, 256).state().theta
-    assert np.abs(ends[0] - euler).max() < 5e-4  # the plateau; a damping of 0.05 would be off by more
+    assert np.abs(ends[0] - euler).max() < 5e-4  # the plateau
 
 
 @needs("pybullet")

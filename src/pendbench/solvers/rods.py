@@ -245,6 +245,23 @@ def miss(chain: Chain, state: State, h: float) -> float:
 
 
 @compiled
+def rise(chain: Chain, state: State, h: float) -> float:
+    """By how much a step of `bdf2` raises the energy, over the kinetic one before it and the weights' largest."""
+    rows, memory, f = state.room.rows, state.memory, _formula(BDF2, h, h / state.steps[0])
+    x, y, new_x, new_y, height, reach, change, scale = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(len(state.q)):
+        length, mass = chain.lengths[i], 1.0 / chain.couplings[i + 1]
+        new, rod, before = length * rows[ROD_X, i], memory[_ROD, i], memory[_ROD_BEFORE, i]
+        x, new_x = x + memory[_SPEED, i], new_x + f.new * new + f.old * rod + f.older * before
+        new, rod, before = length * rows[ROD_Y, i], memory[_ROD + 1, i], memory[_ROD_BEFORE + 1, i]
+        y, new_y = y + memory[_SPEED + 1, i], new_y + f.new * new + f.old * rod + f.older * before
+        height, reach, kinetic = height + new - rod, reach + length, 0.5 * (x * x + y * y)
+        change += mass * (0.5 * (new_x * new_x + new_y * new_y) - kinetic + chain.gravity * height)
+        scale += mass * (kinetic + abs(chain.gravity) * reach)
+    return change / scale if change > 0.0 else 0.0
+
+
+@compiled
 def accelerate(chain: Chain, state: State, h: float) -> None:
     """Change the speeds by what pulls along the mean of old and new rods, and gravity, do in a step of h (s).
 
