@@ -71,6 +71,18 @@ def test_a_fixed_step_costs_the_median_of_its_samples(monkeypatch):
     assert found.run_s == pytest.approx(0.13)
 
 
+class Calling(Run):
+    """A call takes 8 ms, whatever it is for, and a step 0.03 ms: an engine that is compiled for many steps."""
+
+    def advance(self, steps):
+        self._watch.now += 8e-3 + 3e-5 * steps
+
+
+def test_where_a_call_costs_more_than_its_steps_these_are_timed(monkeypatch):
+    found = timed(monkeypatch, Calling, 1e-4)
+    assert 30.0 < found.step_us < 45.0
+
+
 def test_a_run_of_one_step_costs_that_step(monkeypatch):
     """25 ms, as slow as the samples are, whether one step is told or none."""
     for told in (1, 0):

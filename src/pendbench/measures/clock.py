@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -20,6 +21,8 @@ REPEATS = 5
 _READINGS = 200
 _MOST_RUNS = 100  # that are put together for one sample, where each is short
 _OTHERS, _TICKS = 1.2, 0.1  # of a thread's own time, and s, beyond which a process's time is that of others, too
+_LONGER = 1.5  # what twice the steps take at least, over what the steps took, where it is steps that are timed
+_CALL_S = 0.05  # what no call takes but for its steps
 _SAMPLE_S = 0.01  # a sample shorter than this is mostly the clock's own noise
 
 
@@ -66,13 +69,16 @@ def _fixed(engine: Engine, scene: Scene, method: str, dt: float, settings: dict[
 
 
 def _steps_of_sample(simulation: Simulation, most: int) -> int:
-    """How many of a run's steps fill a sample."""
-    taken, steps, spent = 0, 1, 0.0
-    while taken + steps <= most and spent < _SAMPLE_S / 4:
-        spent = _seconds(partial(simulation.advance, steps))
+    """How many of a run's steps fill a sample: so many that the call itself is not what is timed."""
+    taken, steps, before, spent = 0, 1, math.inf, 0.0
+    while taken + steps <= most and (spent < _SAMPLE_S / 4 or spent < min(_LONGER * before, _CALL_S)):
+        before, spent = spent or math.inf, _seconds(partial(simulation.advance, steps))
         taken += steps
         steps *= 2
-    return max(1, min(most, round(steps / 2 * _SAMPLE_S / max(spent, 1e-9))))
+    last = steps // 2
+    if 2.0 * before - spent > 0.1 * spent:  # that is the call
+        return max(1, last)
+    return max(1, min(most, round(last * _SAMPLE_S / max(spent, 1e-9))))
 
 
 def _adaptive(engine: Engine, scene: Scene, method: str, settings: dict[str, float], until: float) -> Timing:
