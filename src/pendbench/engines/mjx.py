@@ -55,7 +55,7 @@ _EFFECTS: Final = {
 _PASSIVE: Final = int(mujoco.mjtDisableBit.mjDSBL_SPRING | mujoco.mjtDisableBit.mjDSBL_DAMPER)
 # XLA's newer way to fuse loops computes what a link hands on again wherever it is used: 0.03 ms a step with 4 links,
 # 300 ms with 8. So it is turned off, for all methods.
-_UNREPEATED: Final = {"xla_cpu_use_fusion_emitters": False}
+_UNREPEATED: Final[dict[str, bool]] = {"xla_cpu_use_fusion_emitters": False}
 _MOST_LINKS: Final = 20  # JAX unrolls the tree: rk4 of so many takes 100 s and 3.7 GB to compile
 
 
@@ -68,7 +68,16 @@ def _advanced() -> Any:
     def advanced(model: Any, data: Any, steps: int) -> Any:
         return jax.lax.fori_loop(0, steps, lambda _, d: mjx.step(model, d), data)
 
-    return jax.jit(advanced, compiler_options=_UNREPEATED)
+    return jax.jit(advanced, compiler_options=_options())
+
+
+def _options() -> dict[str, bool]:
+    """What XLA is told, where it is of a version that knows it."""
+    try:
+        jax.jit(lambda x: x, compiler_options=_UNREPEATED)(0.0)
+    except jax.errors.JaxRuntimeError:
+        return {}
+    return _UNREPEATED
 
 
 class _Run:
