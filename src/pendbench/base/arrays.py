@@ -22,7 +22,7 @@ def no_rows() -> FloatArray:
 
 def all_finite(*arrays: FloatArray) -> bool:
     """Whether no number of these arrays is nan or infinite."""
-    return all(np.isfinite(array).all() for array in arrays)  # np.all() takes three times as long
+    return all(np.isfinite(array).all() for array in arrays)  # np.all() takes half as long again
 
 
 def largest(values: FloatArray) -> float:

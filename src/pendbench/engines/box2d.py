@@ -21,7 +21,7 @@ from typing import Any, Final
 import numpy as np
 import pyb2d3 as b2
 
-from pendbench.base.arrays import FloatArray
+from pendbench.base.arrays import FloatArray, all_finite
 from pendbench.base.faults import Fault
 from pendbench.engines.points import Turns, pushes, start_of, state_of
 from pendbench.engines.protocol import Mapped, Method, Setting, Simulation, State, needed_step
@@ -117,7 +117,7 @@ class _Run:
 
     def health(self) -> Fault | None:
         found = self._measure()
-        if not np.all(np.isfinite(found[:2])):
+        if not all_finite(*found[:2]):
             return Fault("not finite", "a position or a velocity is not finite")
         if found.gap > _TORN:
             return Fault("torn", f"a rod is off its length by {found.gap:.3g} of it")

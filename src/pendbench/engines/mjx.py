@@ -10,6 +10,7 @@ There is no callback in Python from compiled code: what MuJoCo has no law for (d
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from typing import Any, Final
@@ -63,7 +64,8 @@ _MOST_LINKS: Final = 20  # JAX unrolls the tree: rk4 of so many takes 100 s and 
 def _advanced() -> Any:
     """Steps in one call; compiled anew for each shape and precision."""
     if jax.config.jax_compilation_cache_dir is None:
-        jax.config.update("jax_compilation_cache_dir", str(user_cache() / "jax"))
+        with suppress(RuntimeError):  # this user has no home
+            jax.config.update("jax_compilation_cache_dir", str(user_cache() / "jax"))
 
     def advanced(model: Any, data: Any, steps: int) -> Any:
         return jax.lax.fori_loop(0, steps, lambda _, d: mjx.step(model, d), data)

@@ -7,9 +7,7 @@ from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
-
-from pendbench.base.arrays import FloatArray
+from pendbench.base.arrays import FloatArray, all_finite
 from pendbench.base.errors import InputError
 from pendbench.base.faults import Fault
 from pendbench.base.strict import show
@@ -181,9 +179,7 @@ def needed_step(method: str, dt: float | None) -> float:
 
 def not_finite(state: State) -> Fault | None:
     """The fault of a state with an angle or a rate that is no number; None where all are."""
-    if np.isfinite(state.theta).all() and np.isfinite(state.omega).all():
-        return None
-    return Fault("not finite", "an angle or a rate is not finite")
+    return None if all_finite(state.theta, state.omega) else Fault("not finite", "an angle or a rate is not finite")
 
 
 def setting_line(engine: Engine, method: str, dt: float | None, settings: Mapping[str, float]) -> str:

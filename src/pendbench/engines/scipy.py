@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 import scipy
 
-from pendbench.base.arrays import FloatArray
+from pendbench.base.arrays import FloatArray, all_finite
 from pendbench.base.faults import Fault
 from pendbench.engines.protocol import AdaptiveSimulation, Mapped, Method, Setting, State
 from pendbench.physics import acting
@@ -113,7 +113,7 @@ class _Run:
             said = self._solver.step()
         except (ValueError, np.linalg.LinAlgError) as error:  # a matrix with infinities in it, or a singular one
             said = str(error)
-        if self._solver.status == "failed" or not np.all(np.isfinite(self._solver.y)):
+        if self._solver.status == "failed" or not all_finite(self._solver.y):
             said = said or "an angle or a rate is not finite"
         self._wrong = said or ""
 

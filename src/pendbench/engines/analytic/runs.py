@@ -7,9 +7,9 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from pendbench.base.arrays import FloatArray, all_finite
+from pendbench.base.arrays import FloatArray
 from pendbench.base.faults import Fault
-from pendbench.engines.protocol import State
+from pendbench.engines.protocol import State, not_finite
 from pendbench.physics.acting import check_plain
 from pendbench.physics.geometry import positions, rod_vectors, velocities
 from pendbench.physics.kernels.system import RotorSystem
@@ -21,10 +21,6 @@ from pendbench.solvers.compensated import sum_from
 from pendbench.solvers.dop853 import DOP853
 from pendbench.solvers.methods import FixedStep, Form
 from pendbench.solvers.rattle import rods_of
-
-
-def _finite(*arrays: FloatArray) -> Fault | None:
-    return None if all_finite(*arrays) else Fault("not finite", "an angle or a rate is not finite")
 
 
 def _given_up(how: int, t: float) -> Fault | None:
@@ -146,7 +142,7 @@ class FixedRun:
         if self._stuck:
             where = f"at t = {self._taken * self._dt:.6g} s"
             return Fault("not converged", f"{self._method.stuck} {where}; {self._method.remedy}")
-        return _finite(*self.state()[:2])
+        return not_finite(self.state())
 
 
 def _limits(settings: Mapping[str, Any], relative: Any) -> control.Limits:
@@ -180,7 +176,7 @@ class Adaptive:
 
     def health(self) -> Fault | None:
         """Whether it is finite and within its limits."""
-        return _given_up(self._outcome, self._t) or _finite(self._y.value)
+        return _given_up(self._outcome, self._t) or not_finite(self.state())
 
 
 class Taylor:
@@ -209,4 +205,4 @@ class Taylor:
 
     def health(self) -> Fault | None:
         """Whether it is finite and within its limits."""
-        return _given_up(self._outcome, self._t) or _finite(self._state.theta, self._state.omega)
+        return _given_up(self._outcome, self._t) or not_finite(self._state)
