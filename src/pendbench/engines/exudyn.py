@@ -6,8 +6,9 @@ has a spectral radius of 0.9, which damps what swings within a few steps, and no
 
 Effects are a user function in Python that is called at every evaluation of the equations, so methods keep their order.
 A new call of `SolveDynamic` forgets what the implicit solvers know of the last step; so those with a fixed step are
-driven by the functions that `SolveSteps` itself consists of. DOPRI5, which chooses its steps, is explicit and knows
-nothing of the last: each advance is a call of its own, from the state that the one before left.
+made once and asked to go on by `SolveSteps`. What that consists of can be called too, and must not be: where Newton's
+method begins a step again, it begins at the state that `SolveSteps` alone keeps. DOPRI5, which chooses its steps, is
+explicit and knows nothing of the last: each advance is a call of its own, from the state that the one before left.
 """
 
 from __future__ import annotations
@@ -72,11 +73,9 @@ _EFFECTS: Final = {
     "armature": Mapped("its joints have no inertia of their own", refused=True),
     "links": Mapped("mass, centre and inertia of the links"),
 }
-_START: Final = exudyn.ConfigurationType.StartOfStep
 _INITIAL: Final = exudyn.ConfigurationType.Initial
 _SHORTEST_STEP: Final = 1e-12  # s; Exudyn's own is 1e-8
 _FIRST_STEP: Final = 0.01  # s, the longest that Exudyn takes by default; one that ends in infinities would be kept
-_MANY: Final = 1_000_000_000  # steps that a solver is told of; it is never asked for all
 exudyn.config.suppressWarnings = True  # it prints them
 
 
@@ -148,26 +147,30 @@ class _Stepped:
     """A run with a fixed step."""
 
     def __init__(self, scene: Scene, solver: _Solver, dt: float) -> None:
-        self._chain, self._failed, self._taken = _Chain(scene), False, 0
+        self._chain, self._failed, self._taken, self._dt = _Chain(scene), False, 0, dt
         self.state = self._chain.state
         self._settings = _settings(solver.its_name)
-        self._settings.timeIntegration.numberOfSteps = _MANY
-        self._settings.timeIntegration.endTime = _MANY * dt
-        self._solver = exudyn.MainSolverExplicit() if solver.explicit else exudyn.MainSolverImplicitSecondOrder()
+        self._settings.timeIntegration.adaptiveStep = False
+        self._settings.timeIntegration.numberOfSteps = 1
+        self._settings.timeIntegration.endTime = dt  # so that this is its step, to the bit
+        self._implicit = not solver.explicit
+        self._solver = exudyn.MainSolverImplicitSecondOrder() if self._implicit else exudyn.MainSolverExplicit()
         self._solver.InitializeSolver(self._chain.mbs, self._settings)
-        self._solver.it.currentStepSize = self._dt = dt
 
     def advance(self, steps: int) -> None:
-        mbs, settings, solver = self._chain.mbs, self._settings, self._solver
+        at_once = 1 if self._implicit else max(steps, 1)  # a call begins with a new Jacobian: so it is one every step
         with _interruptible():
-            for _ in range(steps):
+            for _ in range(0, steps, at_once):
                 if self._failed:
                     return
-                mbs.systemData.SetTime(self._taken * self._dt, _START)  # the explicit ones leave that to `SolveSteps`
-                solver.InitializeStep(mbs, settings)
-                self._failed = not solver.DiscontinuousIteration(mbs, settings)
-                solver.FinishStep(mbs, settings)
-                self._taken += 1
+                self._advance(at_once)
+
+    def _advance(self, steps: int) -> None:
+        now = self._solver.it
+        now.startTime = self._taken * self._dt
+        self._taken += steps
+        now.endTime = (self._taken - 0.5) * self._dt  # the first step past it is the last
+        self._failed = not self._solver.SolveSteps(self._chain.mbs, self._settings)
 
     def health(self) -> Fault | None:
         if fault := not_finite(self.state()):
