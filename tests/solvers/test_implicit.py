@@ -114,6 +114,21 @@ def test_energy_momentum_keeps_the_energy_of_its_speeds() -> None:
         assert abs(its.energy() - first) < 1e-12 * scale
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_energy_momentum_keeps_it_where_rods_turn_far_in_a_step(seed: int) -> None:
+    """Newton's method takes rods round more often than they go, and they are turned back, and their pulls with them.
+
+    Measured: within 1.1e-14 of the scale; with the pulls as they were, 0.2 to 1,093 times it in seven of these.
+    """
+    rng = np.random.default_rng(seed)
+    lengths, masses = 10 ** rng.uniform(-1, 0.3, 8), 10 ** rng.uniform(-1, 1, 8)
+    angles, rates = rng.uniform(-3, 3, 8), rng.normal(0, 2, 8)
+    scene = Scene.chain(n=8, length=lengths, mass=masses, gravity=9.81, angles=angles, rates=rates)
+    its = Rods(scene, "energy_momentum")
+    assert its.steps(0.1, 20) == 20
+    assert abs(its.energy() - float(energy(scene, angles, rates))) < 1e-12 * energy_scale(scene)
+
+
 def test_energy_momentum_says_nearly_that_energy() -> None:
     """Rates are those of the nearest motion that keeps the rods: what is left out is of order h^4."""
     scene, errors = random_chain(6, seed=1), []

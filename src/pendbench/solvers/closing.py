@@ -189,7 +189,10 @@ def close(chain: Chain, room: Room, angles: FloatArray, share: float, tolerance:
     else:
         return False
     for i in range(n):
-        rows[ANGLE, i] -= TURN * np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
+        turns = np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
+        rows[ANGLE, i] -= TURN * turns
+        if share < 1.0 and turns % 2.0 != 0.0:  # half a turn back, the mean of old and new points the other way
+            rows[PULL, i] = -rows[PULL, i]
     write_rods(rows[ANGLE, :n], rows, ROD_Y)
     return True
 
