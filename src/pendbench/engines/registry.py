@@ -31,7 +31,7 @@ _BUNDLED: Final = {
     "box2d": ("pendbench.engines.box2d:Box2dEngine", "pendbench"),
     "dart": ("pendbench.engines.dart:DartEngine", "pendbench"),
     "drake": ("pendbench.engines.drake:DrakeEngine", "pendbench"),
-    "exudyn": ("pendbench.engines.exudyn:ExudynEngine", "pendbench"),
+    "exudyn": ("pendbench.engines.exudyn.adapter:ExudynEngine", "pendbench"),
     "heyoka": ("pendbench.engines.heyoka:HeyokaEngine", "pendbench"),
     "mujoco": ("pendbench.engines.mujoco.adapter:MujocoEngine", "mujoco-core"),
     "mjx": ("pendbench.engines.mjx:MjxEngine", "pendbench"),
