@@ -72,6 +72,22 @@ def test_a_process_that_dies_is_an_error_of_its_run_and_the_next_one_has_another
     assert process.ask("describe")
 
 
+_AT_THE_END = """
+import atexit, sys
+from pendbench.engines import elsewhere
+atexit.register(lambda: vars(elsewhere).update(dict.fromkeys(vars(elsewhere))))
+print(elsewhere.stand_in("pymunk", sys.executable).version())
+kept = elsewhere.stand_in
+"""
+
+
+def test_the_end_of_a_program_that_used_one_is_silent():
+    """What outlives its module finds no names there, as where the interpreter itself empties modules at its end."""
+    ended = subprocess.run([sys.executable, "-c", _AT_THE_END], capture_output=True, text=True, check=True)
+    assert ended.stdout.strip()
+    assert ended.stderr == ""
+
+
 def test_an_engine_that_is_not_there_is_missing():
     with pytest.raises(MissingEngineError, match="engine 'nowhere' of "):
         Elsewhere("nowhere", _Process("nowhere", sys.executable))

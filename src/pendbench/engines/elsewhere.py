@@ -12,11 +12,11 @@ import os
 import pickle
 import signal
 import subprocess
-import sys
+import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
-from typing import Any, Final, cast
+from typing import IO, Any, Final, cast
 
 from pendbench import __version__
 from pendbench.base.errors import InputError, MissingEngineError, printable
@@ -88,6 +88,7 @@ class _Process:
             own = {key: value for key, value in os.environ.items() if key != PYTHONS}
             command = [self._path, "-m", _CHILD, self._name, str(os.getpid())]
             self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=own)
+            self._end = weakref.finalize(self, _end, self._child)
         try:
             pickle.dump((verb, arguments, _time_left()), self._child.stdin)
             self._child.stdin.flush()
@@ -102,18 +103,10 @@ class _Process:
         return value
 
     def close(self) -> None:
-        """End the other process, which has nothing to lose."""
-        child, self._child = self._child, None
-        if child is not None:
-            child.kill()
-            child.wait()
-            for stream in (child.stdin, child.stdout):
-                with suppress(OSError):  # what was not sent is of no use any more
-                    stream.close()
-
-    def __del__(self) -> None:
-        if not sys.is_finalizing():  # at the end of this process the other ends by itself
-            self.close()
+        """End the other process."""
+        if self._child is not None:
+            self._end()
+            self._child = None
 
     def _ending(self) -> str:
         code = self._child.wait()
@@ -121,6 +114,15 @@ class _Process:
         if hasattr(signal, "SIGPROF") and code == -signal.SIGPROF:
             signal.raise_signal(signal.SIGPROF)  # the job has used up its time
         return f"the process of engine {self._name!r} ended with {code}"
+
+
+def _end(child: subprocess.Popen[bytes]) -> None:
+    """End a process that has nothing to lose."""
+    child.kill()
+    child.wait()
+    for stream in (child.stdin, child.stdout):
+        with suppress(OSError):  # what was not sent is of no use any more
+            cast(IO[bytes], stream).close()
 
 
 def _time_left() -> float:
