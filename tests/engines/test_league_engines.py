@@ -183,6 +183,17 @@ def test_a_free_link_of_rapier_keeps_turning():
     assert run("rapier", "multibody", scene, 1e-3, 1000).state().omega[0] == pytest.approx(1.0, abs=1e-4)
 
 
+@needs("pybullet")
+def test_a_free_link_of_pybullet_keeps_turning_unless_its_damping_stays_on():
+    """Damping of 0.04 of the rate a second, of the body and of its turning: exp(-0.08) of it is left, 0.923."""
+    scene = chain(1, rate=1.0, gravity=None)
+    kept, damped = [
+        run("pybullet", "multibody", scene, 1e-3, 1000, default_flags=flags).state().omega[0] for flags in (0, 1)
+    ]
+    assert kept == pytest.approx(1.0, abs=1e-9)
+    assert damped == pytest.approx(math.exp(-0.08), abs=0.01)
+
+
 @needs("drake")
 def test_a_discrete_plant_takes_as_many_steps_as_are_asked_for():
     """Semi-implicit Euler from rest: after k steps the angle has fallen by k (k + 1) / 2 times the first fall."""
@@ -259,3 +270,12 @@ def test_exudyn_keeps_a_step_cut_from_call_to_call():
     assert found.status == "ok"
     values = energy(scene, found.theta, found.omega)
     assert np.abs(values - values[0]).max() < 0.2 * energy_scale(scene)
+
+
+@needs("mjx")
+def test_mjx_goes_on_where_xla_does_not_know_what_it_is_told(monkeypatch):
+    from pendbench.engines import mjx
+
+    assert mjx._options() == mjx._UNREPEATED
+    monkeypatch.setattr(mjx, "_UNREPEATED", {"xla_no_such_option": True})
+    assert mjx._options() == {}
