@@ -213,6 +213,14 @@ def test_the_two_solvers_of_newton_are_the_same_method_and_no_damping_is_on():
     assert np.abs(ends[0] - euler).max() < 5e-4  # the plateau
 
 
+@needs("newton")
+def test_kernels_of_others_keep_their_derivatives():
+    import warp
+
+    run("newton", "featherstone", chain(1), 1e-2, 1)
+    assert warp.config.enable_backward
+
+
 @needs("pybullet")
 def test_pybullets_motors_hold_a_chain_as_it_comes_but_not_a_heavy_one():
     """A motor gives at most 1 N m s in a step: at 1/240 s it holds 240 N m, so 24 kg at 1 m under 10 m/s^2."""

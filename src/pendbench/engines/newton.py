@@ -2,7 +2,8 @@
 
 All numbers are of single precision, and nothing has to be switched off: Featherstone's angular damping of 0.05 is a
 setting that no kernel of it reads, and limits of the joints have no stiffness here. A step is some launches of kernels
-from Python, and the first one compiles for half a minute, unless Warp has them in its cache.
+from Python, and the first one compiles for 20 s, unless Warp has them in its cache. Derivatives of
+Featherstone's kernels, which nobody asks for here, would take 11 s more.
 
 Newton's other solvers are no methods: docs/engines.md says of each why.
 """
@@ -10,7 +11,8 @@ Newton's other solvers are no methods: docs/engines.md says of each why.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib.metadata import version
 from typing import Any, Final
 
@@ -25,10 +27,24 @@ from pendbench.physics import acting
 from pendbench.scene.scene import Scene
 
 with silenced():  # it says which devices there are
-    import newton
     import warp
 
     warp.config.log_level = warp.LOG_ERROR  # and later what it compiles
+
+
+@contextmanager
+def _without_derivatives() -> Iterator[None]:
+    """Modules of kernels that come to be in the meantime have none, which takes half as long to compile."""
+    kept, warp.config.enable_backward = warp.config.enable_backward, False
+    try:
+        yield
+    finally:
+        warp.config.enable_backward = kept
+
+
+with silenced(), _without_derivatives():
+    import newton
+
     warp.init()
 
 _SOLVERS: Final = {"featherstone": "SolverFeatherstone", "steel": "SolverSteel"}
@@ -65,8 +81,9 @@ class _Chain:
         self._now, self._next = self._model.state(), self._model.state()
         self._control = self._model.control()
         newton.eval_fk(self._model, self._model.joint_q, self._model.joint_qd, self._now)
-        self._solver = getattr(newton.solvers, _SOLVERS[method])(self._model)
-        self._solver.step(self._now, self._next, self._control, None, dt)  # compiles, and is forgotten
+        with _without_derivatives():
+            self._solver = getattr(newton.solvers, _SOLVERS[method])(self._model)
+            self._solver.step(self._now, self._next, self._control, None, dt)  # compiles, and is forgotten
 
     def _made(self, scene: Scene) -> Any:
         builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=(*gravity_at(scene, 0.0), 0.0))
