@@ -2,8 +2,8 @@
 
 All numbers are of single precision, and nothing has to be switched off: Featherstone's angular damping of 0.05 is a
 setting that no kernel of it reads, and limits of the joints have no stiffness here. A step is some launches of kernels
-from Python, and the first one compiles for 20 s, unless Warp has them in its cache. Derivatives of
-Featherstone's kernels, which nobody asks for here, would take 11 s more.
+from Python, and the first one compiles for 20 s, unless Warp has them in its cache. Derivatives of Featherstone's
+kernels, which nobody asks for here, would take 13 s more.
 
 Newton's other solvers are no methods: docs/engines.md says of each why.
 """
