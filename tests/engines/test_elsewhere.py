@@ -88,6 +88,18 @@ def test_the_end_of_a_program_that_used_one_is_silent():
     assert ended.stderr == ""
 
 
+def test_no_process_is_started_to_forget_a_run():
+    process = _Process("pymunk", sys.executable)
+    process.forget(1)
+    assert process._child is None
+    assert process.ask("describe")
+    process._child.kill()
+    ended = process._child
+    ended.wait()
+    process.forget(1)
+    assert process._child is ended
+
+
 def test_an_engine_that_is_not_there_is_missing():
     with pytest.raises(MissingEngineError, match="engine 'nowhere' of "):
         Elsewhere("nowhere", _Process("nowhere", sys.executable))

@@ -102,6 +102,11 @@ class _Process:
             raise RuntimeError(value)
         return value
 
+    def forget(self, number: int) -> None:
+        """Let it drop a run; one that has ended has none, and is not started for that."""
+        if self._child is not None and self._child.poll() is None:
+            self.ask("drop", number)
+
     def close(self) -> None:
         """End the other process."""
         if self._child is not None:
@@ -144,7 +149,7 @@ class _Run:
 
     def __del__(self) -> None:
         try:
-            self._process.ask("drop", self._number)
+            self._process.forget(self._number)
         except Exception:  # it is gone, and so is the run
             return
 

@@ -28,7 +28,7 @@ _SOLVERS: Final = {
     "rk6": _Solver("RK67", True, 6, "a Runge-Kutta method of seven stages"),
     "euler": _Solver("ExplicitEuler", True, 1, "explicit Euler, of angles and rates"),
 }
-_TOLERANCE: Final = {"tolerance": Setting(1e-8, 1e-13, 1e-2, note="of a step, relative and absolute; Exudyn's is 1e-8")}
+_TOLERANCE: Final = {"tolerance": Setting(1e-8, 1e-13, 1e-2, note="of a step, rad and rad/s; Exudyn's is 1e-8")}
 _METHODS: Final = {
     **{name: Method(its.order, substeps=not its.explicit, note=its.note) for name, its in _SOLVERS.items()},
     "dopri5": Method(5, adaptive=True, settings=_TOLERANCE, note="Runge-Kutta of order 5 (4), of Dormand and Prince"),

@@ -41,44 +41,15 @@ def _settings(its_name: str, dt: float) -> Any:
     return chosen
 
 
-class Explicit:
-    """A run with a fixed step, by a formula."""
+class _Stepped:
+    """A run with a fixed step. Each is a call of `SolveSteps`, so it is the same run however many are asked for."""
 
-    def __init__(self, scene: Scene, its_name: str, dt: float) -> None:
-        self._chain, self._taken, self._dt = Chain(scene), 0, dt
-        self.state = self._chain.state
-        self._settings = _settings(its_name, dt)
-        self._settings.timeIntegration.adaptiveStep = False
-        self._solver = exudyn.MainSolverExplicit()
-        self._solver.InitializeSolver(self._chain.mbs, self._settings)
-
-    def advance(self, steps: int) -> None:
-        if not steps:
-            return
-        now = self._solver.it
-        now.startTime = self._taken * self._dt
-        self._taken += steps
-        now.endTime = (self._taken - 0.5) * self._dt  # the first step past it is the last
-        with _interruptible():
-            self._solver.SolveSteps(self._chain.mbs, self._settings)
-
-    def health(self) -> Fault | None:
-        return not_finite(self.state())
-
-
-class Implicit:
-    """A run with a step that is cut where Newton's method fails, and for some steps after that.
-
-    A call of `SolveSteps` begins with a new Jacobian and with the whole step. So each step is a call, whatever is asked
-    for, and how far steps are cut is kept from one to the next, by Exudyn's own rule.
-    """
-
-    def __init__(self, scene: Scene, its_name: str, dt: float) -> None:
+    def __init__(self, scene: Scene, its_name: str, dt: float, solver: Any, *, cut: bool) -> None:
         self._chain, self._failed, self._taken, self._dt = Chain(scene), False, 0, dt
-        self._parts, self._good = 1, 0
         self.state = self._chain.state
         self._settings = _settings(its_name, dt)
-        self._solver = exudyn.MainSolverImplicitSecondOrder()
+        self._settings.timeIntegration.adaptiveStep = cut
+        self._solver = solver
         self._solver.InitializeSolver(self._chain.mbs, self._settings)
 
     def advance(self, steps: int) -> None:
@@ -86,27 +57,65 @@ class Implicit:
             for _ in range(steps):
                 if self._failed:
                     return
-                self._step()
+                self._failed = True  # unless it comes to its end: an interrupt leaves the run in the middle of a step
+                self._failed = not self._step()
 
-    def _step(self) -> None:
-        now, rule = self._solver.it, self._settings.timeIntegration
-        now.startTime = now.currentTime = self._taken * self._dt
-        self._taken += 1
-        now.endTime, now.maxStepSize = self._taken * self._dt, self._dt / self._parts
-        self._failed = not self._solver.SolveSteps(self._chain.mbs, self._settings)
-        parts = now.currentStepIndex - 1
-        if parts > self._parts:
-            self._parts, self._good = 1 << (parts - 1).bit_length(), 0
-            return
-        self._good += parts
-        easy = now.newtonSteps + now.discontinuousIteration <= rule.adaptiveStepRecoveryIterations
-        if self._parts > 1 and self._good >= rule.adaptiveStepRecoverySteps and easy:
-            self._parts, self._good = self._parts // 2, 0
+    def _step(self) -> bool:
+        raise NotImplementedError
+
+    def _solve(self, start: float, end: float) -> bool:
+        now = self._solver.it
+        now.startTime = now.currentTime = start
+        now.endTime = end
+        return bool(self._solver.SolveSteps(self._chain.mbs, self._settings))
 
     def health(self) -> Fault | None:
         if fault := not_finite(self.state()):
             return fault
-        return Fault("not converged", "Newton's method gave up in the shortest step") if self._failed else None
+        return Fault("not converged", "Exudyn gave up in the shortest step") if self._failed else None
+
+
+class Explicit(_Stepped):
+    """A run by a formula."""
+
+    def __init__(self, scene: Scene, its_name: str, dt: float) -> None:
+        super().__init__(scene, its_name, dt, exudyn.MainSolverExplicit(), cut=False)
+
+    def _step(self) -> bool:
+        start = self._taken * self._dt
+        self._taken += 1
+        return self._solve(start, start + 0.5 * self._dt)  # the first step past it is the last
+
+
+class Implicit(_Stepped):
+    """A run whose step is cut where Newton's method fails, and for some steps after that.
+
+    A call of `SolveSteps` begins with a new Jacobian and with the whole step. How far steps are cut is kept from one to
+    the next, by Exudyn's own rule.
+    """
+
+    def __init__(self, scene: Scene, its_name: str, dt: float) -> None:
+        super().__init__(scene, its_name, dt, exudyn.MainSolverImplicitSecondOrder(), cut=True)
+        self._parts, self._good = 1, 0
+
+    def _step(self) -> bool:
+        start = self._taken * self._dt
+        self._taken += 1
+        self._solver.it.maxStepSize = self._dt / self._parts
+        solved = self._solve(start, self._taken * self._dt)
+        self._choose_parts(self._solver.it)
+        return solved
+
+    def _choose_parts(self, last: Any) -> None:
+        """Into how many parts the next step is cut."""
+        rule, parts = self._settings.timeIntegration, last.currentStepIndex - 1
+        if parts > self._parts:
+            self._parts, self._good = 1 << (parts - 1).bit_length(), 0
+            return
+        self._good += parts
+        easy = last.newtonSteps + last.discontinuousIteration <= rule.adaptiveStepRecoveryIterations
+        if self._parts > 1 and self._good >= rule.adaptiveStepRecoverySteps and easy:
+            self._parts, self._good = self._parts // 2, 0
 
 
 class Chosen:
@@ -117,7 +126,9 @@ class Chosen:
         self.state = self._chain.state
         self._settings = _settings("DOPRI5", _FIRST_STEP)
         chosen = self._settings.timeIntegration
-        chosen.absoluteTolerance = chosen.relativeTolerance = tolerance
+        # No relative one: Exudyn's scale, a + r x without absolute values, is 0 at -1 where a and r are the same, and a
+        # step that begins there is taken whatever its error is.
+        chosen.absoluteTolerance, chosen.relativeTolerance = tolerance, 0.0
         chosen.minimumStepSize = _SHORTEST_STEP
 
     def advance_to(self, time: float) -> int:
