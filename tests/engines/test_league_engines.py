@@ -91,6 +91,15 @@ def test_the_default_tolerance_is_the_one_that_people_get_and_a_tight_one_is_ano
     assert all(1e-6 < np.abs(ends[name] - ends["tight"]).max() < 0.1 for name in ("rk45", "dop853", "lsoda", "radau"))
 
 
+@pytest.mark.parametrize("method", ["rk45", "dop853", "lsoda", "radau"])
+def test_scipy_begins_where_nothing_moves_yet(method):
+    """LSODA had made its first step a share of the time to go, and warned, and failed."""
+    scene = load_scene("driven_triple")
+    found = pb.simulate(scene, "scipy", method, None, [1.0], tolerance=1e-6)
+    assert found.status == "ok"
+    assert np.abs(found.theta - pb.reference(scene, [1.0]).theta).max() < 1e-3
+
+
 def test_solve_ivp_gives_the_same():
     from scipy.integrate import solve_ivp
 

@@ -9,6 +9,8 @@ The default tolerance is scipy's, 1e-3: its RK45 then keeps a double pendulum fo
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -93,14 +95,19 @@ class _Run:
     def __init__(self, scene: Scene, method: str, tolerance: float, most_steps: int) -> None:
         solver: Any = getattr(scipy.integrate, _SOLVERS[method][0])
         start = np.concatenate([scene.angles, scene.rates])
+        equations, limits = _Equations(scene), {"rtol": tolerance, "atol": _SHARE * tolerance}
         with np.errstate(all="ignore"):
-            self._solver = solver(_Equations(scene), 0.0, start, _FOREVER, rtol=tolerance, atol=_SHARE * tolerance)
+            if method == "lsoda" and not equations(0.0, start).any():
+                # Where nothing moves yet it takes that share of the time to go, which is for ever here.
+                limits["first_step"] = scene.duration * math.sqrt(tolerance)
+            self._solver = solver(equations, 0.0, start, _FOREVER, **limits)
         self._left, self._time, self._wrong = most_steps, 0.0, ""
         self._between: Any = None
 
     def advance_to(self, time: float) -> int:
         before, its = self._left, self._solver
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # LSODA warns before it fails, which is told as a fault
             while its.t < time and self._left > 0 and not self._wrong:
                 self._left -= 1
                 self._step()
