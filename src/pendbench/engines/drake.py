@@ -24,16 +24,7 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pendbench.base.faults import Fault
 from pendbench.engines.joint_run import gravity_at, torques_in_joints, weights_in_joints
 from pendbench.engines.joints import absolute_values, bodies, joint_values
-from pendbench.engines.protocol import (
-    AdaptiveSimulation,
-    Mapped,
-    Method,
-    Setting,
-    Simulation,
-    State,
-    needed_step,
-    not_finite,
-)
+from pendbench.engines.protocol import Mapped, Method, Setting, State, needed_step, not_finite
 from pendbench.physics import acting
 from pendbench.scene.scene import Scene
 
@@ -174,9 +165,8 @@ class DrakeEngine:
         """Nothing but effects."""
         return None
 
-    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> Simulation | AdaptiveSimulation:
+    def build(self, scene: Scene, method: str, dt: float | None, **settings: float) -> _Discrete | _Integrated:
         """A run at time 0."""
         if method in _SCHEMES:
             return _Integrated(scene, _SCHEMES[method], self.methods[method].with_defaults(settings)["tolerance"])
-        dt = needed_step(method, dt)
-        return _Discrete(scene, dt)
+        return _Discrete(scene, needed_step(method, dt))
