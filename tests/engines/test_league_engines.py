@@ -302,7 +302,7 @@ def test_mjx_goes_on_where_xla_does_not_know_what_it_is_told(monkeypatch):
 @pytest.mark.parametrize("method", ["generalized_alpha", "rk4", "euler"])
 def test_exudyn_counts_time_in_steps_whatever_is_asked_for_at_once(method):
     drive = {"joint": 1, "amplitude": 2.0, "angular_frequency": 6.0, "phase": 0.3}
-    driven = dataclasses.replace(chain(3), effects=Effects(gravity=9.81, drive_torque=drive))
+    driven = dataclasses.replace(load_scene("chain10"), effects=Effects(gravity=9.81, drive_torque=drive))
     dt = 0.0013  # whose multiples are rounded
     once, often = (pb.simulate(driven, "exudyn", method, dt, times) for times in ([40 * dt], dt * np.arange(1, 41)))
     np.testing.assert_array_equal(once.theta[-1], often.theta[-1])
