@@ -322,3 +322,19 @@ def test_exudyn_s_error_has_a_scale_where_a_coordinate_is_minus_one():
     found = pb.simulate(rope, "exudyn", "dopri5", None, [0.01])
     truth = pb.reference(rope, [0.01])
     assert np.abs(found.theta - truth.theta).max() < 1e-7
+
+
+@needs("exudyn")
+@pytest.mark.parametrize(("method", "dt"), [("rk4", 1e-3), ("generalized_alpha", 1e-3), ("dopri5", None)])
+def test_a_run_of_exudyn_that_was_interrupted_is_not_well(method, dt, monkeypatch):
+    from pendbench.engines.exudyn import tree
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    damped = dataclasses.replace(chain(2), effects=Effects(gravity=9.81, joint_damping=0.1))
+    made = engine("exudyn").build(damped, method, dt)
+    monkeypatch.setattr(tree, "torques_in_joints", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        made.advance(10) if dt else made.advance_to(0.1)
+    assert made.health() is not None

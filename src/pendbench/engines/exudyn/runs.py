@@ -57,10 +57,12 @@ class _Stepped:
             for _ in range(steps):
                 if self._failed:
                     return
+                start = self._taken * self._dt
+                self._taken += 1
                 self._failed = True  # unless it comes to its end: an interrupt leaves the run in the middle of a step
-                self._failed = not self._step()
+                self._failed = not self._step(start)
 
-    def _step(self) -> bool:
+    def _step(self, start: float) -> bool:
         raise NotImplementedError
 
     def _solve(self, start: float, end: float) -> bool:
@@ -81,9 +83,7 @@ class Explicit(_Stepped):
     def __init__(self, scene: Scene, its_name: str, dt: float) -> None:
         super().__init__(scene, its_name, dt, exudyn.MainSolverExplicit(), cut=False)
 
-    def _step(self) -> bool:
-        start = self._taken * self._dt
-        self._taken += 1
+    def _step(self, start: float) -> bool:
         return self._solve(start, start + 0.5 * self._dt)  # the first step past it is the last
 
 
@@ -98,9 +98,7 @@ class Implicit(_Stepped):
         super().__init__(scene, its_name, dt, exudyn.MainSolverImplicitSecondOrder(), cut=True)
         self._parts, self._good = 1, 0
 
-    def _step(self) -> bool:
-        start = self._taken * self._dt
-        self._taken += 1
+    def _step(self, start: float) -> bool:
         self._solver.it.maxStepSize = self._dt / self._parts
         solved = self._solve(start, self._taken * self._dt)
         self._choose_parts(self._solver.it)
@@ -138,6 +136,7 @@ class Chosen:
         chosen.startTime, chosen.endTime = self._time, time
         chosen.initialStepSize = min(_FIRST_STEP, time - self._time)
         solver, data = exudyn.MainSolverExplicit(), self._chain.mbs.systemData
+        self._failed = True  # unless it comes to its end, as above
         with _interruptible():
             self._failed = not solver.SolveSystem(self._chain.mbs, self._settings)
         data.SetODE2Coordinates(data.GetODE2Coordinates(), _INITIAL)
