@@ -8,6 +8,7 @@ from numpy.polynomial import polynomial
 
 from pendbench.physics.exact import single_pendulum
 from pendbench.physics.kernels.recursion import accelerations
+from pendbench.physics.kernels.single import HIGHEST
 from pendbench.physics.kernels.table import series_system_of
 from pendbench.solvers import problem
 from support.hard_chains import HARD, exact_accelerations, hard_chains, relative_error
@@ -68,6 +69,23 @@ def test_every_order_agrees_with_the_dense_form(n, gravity):
         size = np.abs(expected).max(axis=1, keepdims=True)
         size[size == 0.0] = 1.0
         np.testing.assert_allclose(found / size, expected / size, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("order", range(1, HIGHEST + 1))
+def test_a_pendulum_has_the_orders_that_are_asked_for_and_no_others(order):
+    scene = random_chain(1, 6, spread=2.0)
+    room = np.full((HIGHEST + 2, 1), np.nan)
+    room[0] = scene.rates
+    called(problem.rate_series)(series_system_of(scene, order), 0.0, scene.angles, room[: order + 1])
+    expected = dense_series(scene, order)
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(room[: order + 1] / size, expected / size, rtol=0, atol=1e-12)
+    assert np.isnan(room[order + 1 :]).all()
+
+
+def test_a_pendulum_of_a_higher_order_is_refused():
+    with pytest.raises(ValueError, match=f"a series of order {HIGHEST + 1}; allowed: up to {HIGHEST}"):
+        series_system_of(chain(1, angle=1.0), HIGHEST + 1)
 
 
 @pytest.mark.parametrize("kind", HARD)

@@ -30,6 +30,7 @@ from pendbench.solvers.outcome import (
     steps_at_once,
 )
 from pendbench.solvers.problem import rate_series
+from pendbench.solvers.rough_logarithm import rough_log2
 
 #: A series' step before the series is known: none yet.
 NO_STEP = -1.0
@@ -68,12 +69,12 @@ def order_for(tolerance: float) -> int:
 
 
 @inlined
-def _reach(v: FloatArray, allowed: float, relative: float) -> float:
+def _reach(v: FloatArray, allowed: float, relative: float, shares: FloatArray) -> float:
     """How long (s) the series v (order + 1, d) holds; nan where it is not finite, inf where nothing moves.
 
-    allowed: log of the tolerance over the number of the first order left out. Each of the last orders limits the step
-    by what it adds to q and by what it adds to v. And terms have to fall: close to an equilibrium the last ones can be
-    as small as you like while those that are left out are larger.
+    allowed: log2 of the tolerance over the number of the first order left out; shares: 1 / (k + 1). Each of the last
+    orders limits the step by what it adds to q and by what it adds to v. And terms have to fall: close to an
+    equilibrium the last ones can be as small as you like while those that are left out are larger.
     """
     order = len(v) - 1
     most, late = -np.inf, 0.0
@@ -86,14 +87,19 @@ def _reach(v: FloatArray, allowed: float, relative: float) -> float:
             worst_q = worst_q if size <= worst_q else size
         if not worst_v < np.inf:
             return np.nan
-        most = max(most, math.log(worst_v) / k, math.log(worst_q / (k + 1)) / (k + 1))
+        most = max(most, rough_log2(worst_v) * shares[k - 1], rough_log2(worst_q * shares[k]) * shares[k])
         late += worst_q
+    if late == 0.0:
+        return np.inf
     early = 0.0
     for k in range(max(0, order - 2 * _LAST_ORDERS + 1), order - _LAST_ORDERS + 1):
         for i in range(v.shape[1]):
             early = max(early, abs(v[k, i]))
-    reach = math.exp(allowed - most)
-    return min(reach, 0.5 * math.sqrt(math.sqrt(early / late))) if early > 0.0 and late > 0.0 else reach
+    reach = float(2.0 ** (allowed - most))
+    falls = 4.0 * reach * reach
+    if late * falls * falls <= early or early == 0.0:
+        return reach
+    return 0.5 * math.sqrt(math.sqrt(early / late))
 
 
 @inlined
@@ -107,11 +113,16 @@ def _shares(orders: int) -> FloatArray:
 @inlined
 def _changes(v: FloatArray, i: int, h: float, shares: FloatArray) -> tuple[float, float]:
     """What the series i adds to q and to v within h (s); shares are 1 / (k + 1), the factors of integration."""
-    q_change, v_change = 0.0, 0.0
-    for k in range(len(v) - 1, 0, -1):
-        q_change = q_change * h + v[k, i] * shares[k]
-        v_change = v_change * h + v[k, i]
-    return (q_change * h + v[0, i]) * h, v_change * h
+    # Even and odd powers by themselves: while one waits for its product, the other goes on.
+    square, highest = h * h, len(v) - 1
+    q_even, q_odd, v_even, v_odd = 0.0, 0.0, 0.0, 0.0
+    if highest % 2 == 1:
+        q_even, v_even = v[highest, i] * shares[highest], v[highest, i]
+        highest -= 1
+    for k in range(highest, 0, -2):
+        q_odd, q_even = q_odd * square + v[k, i] * shares[k], q_even * square + v[k - 1, i] * shares[k - 1]
+        v_odd, v_even = v_odd * square + v[k, i], v_even * square + v[k - 1, i]
+    return ((q_odd * h + q_even) * h + v[0, i]) * h, (v_odd * h + v_even) * h
 
 
 def integrate(system: Any, limits: Limits, t: float, h: float, end: float, series: Series) -> Reached:
@@ -149,7 +160,7 @@ def _integrate(
 ) -> Ended:
     """The same, for `pause` series at most."""
     shares = _shares(len(v))
-    allowed = math.log(tolerance) / len(v)
+    allowed = math.log2(tolerance) / len(v)
     taken = 0
     while True:
         if h == NO_STEP:
@@ -159,7 +170,7 @@ def _integrate(
                 return PAUSED, t, h, taken, 0
             rate_series(system, t, q, v)
             taken += 1
-            h = _reach(v, allowed, relative)
+            h = _reach(v, allowed, relative, shares)
         if not h >= 0.0:
             return NOT_FINITE, t, h, taken, 0
         if t + h >= end:

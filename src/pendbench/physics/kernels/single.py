@@ -1,36 +1,102 @@
 """The motion of a single pendulum as a Taylor series in time: `series` has the chains.
 
-Nothing hangs on its rod, so two products are left, (E69), and an order waits for the one before the last only.
+Nothing hangs on its rod, so two products are left, (E69), and an order waits for the one before the last only. They are
+so short that the loops around them would take as long as they do, so all orders are written out, one after another, in
+the compiler's own language: they stay in registers, and the code is left at the order that is asked for.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, cast
 
-import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import inlined
 from pendbench.scene.scene import Scene
 from pendbench.solvers.trigonometry import direction
 
+#: The highest order that is written out; the smallest tolerance that the engine takes needs 18.
+HIGHEST = 20
+
+Kernel = Callable[[FloatArray, float, int], None]
+
+_ONCE = ("contract",)  # a product and a sum are rounded once
+
 
 class SingleSystem(NamedTuple):
-    """A pendulum with one rod, and room for its series.
-
-    pull: -g/l, 1/s^2; stiffness (orders + 1,): the series of -g/l cos(theta); shares (orders + 1,): 1/k, 1 for 0. One
-    thread, one system.
-    """
+    """A pendulum with one rod. pull: -g/l, 1/s^2."""
 
     pull: float
-    stiffness: FloatArray
-    shares: FloatArray
 
 
 def single_system_of(scene: Scene, order: int) -> SingleSystem:
-    """The scene's pendulum under gravity or free of it, with room for series of that order."""
-    pull = -(scene.effects.gravity or 0.0) / float(scene.lengths[0])
-    return SingleSystem(pull, np.zeros(order + 1), 1.0 / np.maximum(1.0, np.arange(order + 1.0)))
+    """The scene's pendulum under gravity or free of it. Raises ValueError where the order is above `HIGHEST`."""
+    if order > HIGHEST:
+        raise ValueError(f"a series of order {order}; allowed: up to {HIGHEST}")
+    return SingleSystem(-(scene.effects.gravity or 0.0) / float(scene.lengths[0]))
+
+
+class _Sums:
+    """Sums of products in the code being generated."""
+
+    def __init__(self, builder: ir.IRBuilder) -> None:
+        self._builder = builder
+
+    def scaled(self, factor: float, value: ir.Value) -> ir.Value:
+        """A number times a value."""
+        return self._builder.fmul(ir.Constant(ir.DoubleType(), factor), value, flags=_ONCE)
+
+    def of(self, pairs: Sequence[tuple[ir.Value, ir.Value]]) -> ir.Value:
+        """The sum of the pairs' products, in two halves: while one waits for a product, the other goes on."""
+        halves = [self._in_a_row(half) for half in (pairs[::2], pairs[1::2]) if half]
+        return halves[0] if len(halves) == 1 else self._builder.fadd(*halves, flags=_ONCE)
+
+    def _in_a_row(self, pairs: Sequence[tuple[ir.Value, ir.Value]]) -> ir.Value:
+        total, *others = (self._builder.fmul(x, y, flags=_ONCE) for x, y in pairs)
+        for product in others:
+            total = self._builder.fadd(total, product, flags=_ONCE)
+        return total
+
+
+def _stiffness(sums: _Sums, omega: Sequence[ir.Value], k: int) -> ir.Value:
+    """Order k > 0 of -g/l cos(theta): half a square, in which each product but that of the middle is there twice."""
+    pairs = [(omega[j], omega[k - j]) for j in range((k + 1) // 2)]
+    if k % 2 == 0:
+        pairs.append((sums.scaled(0.5, omega[k // 2]), omega[k // 2]))
+    return sums.scaled(-1.0, sums.of(pairs))
+
+
+@intrinsic
+def _orders(typingctx: Any, rates: Any, stiffness: Any, last: Any) -> Any:  # noqa: ARG001
+    """From orders 0 and 1 of rates (last + 1, 1) and order 0 of the stiffness, write those from 2 to `last`."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, args: Sequence[Any]) -> Any:
+        data, sums = context.make_array(signature.args[0])(context, builder, args[0]).data, _Sums(builder)
+        at = [builder.gep(data, [ir.Constant(args[2].type, k)]) for k in range(HIGHEST + 1)]
+        omega, q = [builder.load(at[0]), builder.load(at[1])], [args[1]]
+        done = builder.append_basic_block("done")
+        for k in range(HIGHEST - 1):
+            further = builder.append_basic_block(f"order_{k + 2}")
+            builder.cbranch(builder.icmp_signed("<", args[2], args[2].type(k + 2)), done, further)
+            builder.position_at_end(further)
+            if k > 0:
+                q.append(_stiffness(sums, omega, k))
+            # What has only just been written comes last, so that the rest need not wait for it.
+            pairs = [(q[j], omega[k - j]) for j in (*range(1, k), *sorted({0, k}))]
+            omega.append(sums.scaled(1.0 / ((k + 1) * (k + 2)), sums.of(pairs)))
+            builder.store(omega[-1], at[k + 2])
+        builder.branch(done)
+        builder.position_at_end(done)
+        return context.get_dummy_value()
+
+    return types.void(rates, stiffness, last), generate
+
+
+_write_orders = cast(Kernel, _orders)
 
 
 @inlined
@@ -39,20 +105,6 @@ def write_rate_series(s: SingleSystem, t: float, theta: FloatArray, omega: Float
 
     Source: docs/equations.md, (E69).
     """
-    stiffness, shares = s.stiffness, s.shares
     c, sine = direction(theta[0])
-    stiffness[0], omega[1, 0] = s.pull * c, s.pull * sine
-    for k in range(len(omega) - 2):
-        if k > 0:
-            square = 0.0  # half of it: each product is there twice, but for that of the middle
-            for j in range((k + 1) // 2):
-                square += omega[j, 0] * omega[k - j, 0]
-            middle = omega[k // 2, 0] if k % 2 == 0 else 0.0
-            stiffness[k] = -(square + 0.5 * middle * middle)
-        even, odd, pairs = 0.0, 0.0, (k + 1) // 2
-        for j in range(0, 2 * pairs, 2):
-            even += stiffness[j] * omega[k - j, 0]
-            odd += stiffness[j + 1] * omega[k - j - 1, 0]
-        for j in range(2 * pairs, k + 1):
-            even += stiffness[j] * omega[k - j, 0]
-        omega[k + 2, 0] = (even + odd) * shares[k + 1] * shares[k + 2]
+    omega[1, 0] = s.pull * sine
+    _write_orders(omega, s.pull * c, len(omega) - 1)
