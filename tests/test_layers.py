@@ -38,7 +38,7 @@ FLOORS = (
 JOINTED = ("engines.joint_run", "engines.joints", "engines.protocol")
 #: What a part of the house may import of the rest of it, where that is less than its floor would allow.
 ONLY = {
-    "solvers": {"base.arrays", "base.compiled"},
+    "solvers": {"base.arrays", "base.compiled", "base.second_thread"},
     "physics": {"base.arrays", "base.compiled", "base.errors", "effects", "scene", "solvers"},
     # Knows no pendulum.
     "execution": {"base"},

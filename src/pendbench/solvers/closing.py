@@ -29,7 +29,8 @@ from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import compiled, inlined, part
 from pendbench.solvers.trigonometry import write_directions
 
-_MOST_ITERATIONS, _MOST_DESCENTS = 12, 200
+#: Of Newton's method, and of a descent.
+MOST_ITERATIONS, _MOST_DESCENTS = 12, 200
 #: A change of angle, rad, that no iteration recovers from; and one so small that, where it no longer falls, digits end.
 _LOST, _ROUNDING = 30.0, 1e-7
 TURN = 2.0 * np.pi
@@ -75,32 +76,38 @@ def room_for(n: int) -> Room:
 
 
 @inlined
-def write_rods(angles: FloatArray, rows: FloatArray, row: int) -> None:
-    """Write the unit vectors of angles (n,) into two rows: first y, -cos, then x, sin."""
-    write_directions(angles, rows, row, row + 1)
-    for i in range(len(angles)):
+def write_rods(angles: FloatArray, rows: FloatArray, row: int, first: int = 0) -> None:
+    """Write the unit vectors of angles (n,) into two rows, from place `first` on: first y, -cos, then x, sin."""
+    write_directions(angles, rows[row, first:], rows[row + 1, first:])
+    for i in range(first, first + len(angles)):
         rows[row, i] = -rows[row, i]
 
 
 @inlined
-def _write_forces(rows: FloatArray, angles: FloatArray, share: float, along: int) -> None:
-    """From the angles before (n,) and the iterate: the rods, the directions of their pulls, and the pulls."""
-    n = len(angles)
-    write_rods(rows[ANGLE, :n], rows, ROD_Y)
+def pulled_along(share: float) -> int:
+    """The first of the two rows that say where rods pull."""
+    return ROD_Y if share == 1.0 else ALONG_Y
+
+
+@inlined
+def write_pulls(rows: FloatArray, angles: FloatArray, share: float, first: int, last: int) -> None:
+    """From the angles before (n,) and the iterate: rods `first` to `last` - 1, where their pulls point, the pulls."""
+    along = pulled_along(share)
+    write_rods(rows[ANGLE, first:last], rows, ROD_Y, first)
     if share < 1.0:
-        for i in range(n):
+        for i in range(first, last):
             rows[SPARE, i] = angles[i] + share * (rows[ANGLE, i] - angles[i])
-        write_rods(rows[SPARE, :n], rows, ALONG_Y)
-    for i in range(n):
+        write_rods(rows[SPARE, first:last], rows, ALONG_Y, first)
+    for i in range(first, last):
         rows[FORCE_X, i + 1] = rows[PULL, i] * rows[along + 1, i]
         rows[FORCE_Y, i + 1] = rows[PULL, i] * rows[along, i]
 
 
-_Carried = tuple[float, float, float, float, float, float]
+Carried = tuple[float, float, float, float, float, float]
 
 
 @inlined
-def _eliminate(chain: Chain, room: Room, along: int, share: float, i: int, out: float, carried: _Carried) -> _Carried:
+def eliminate(chain: Chain, room: Room, along: int, share: float, i: int, out: float, carried: Carried) -> Carried:
     """Eliminate rod i towards a neighbour behind the coupling `out`; carried: S's part of the rods before, and r's."""
     couplings, rows, kept = chain.couplings, room.rows, room.kept
     a, length, t = couplings[i] + couplings[i + 1], chain.lengths[i], share * rows[PULL, i]
@@ -111,25 +118,25 @@ def _eliminate(chain: Chain, room: Room, along: int, share: float, i: int, out: 
     r_x += couplings[i + 1] * rows[FORCE_X, i + 2] + couplings[i] * rows[FORCE_X, i]
     r_y += couplings[i + 1] * rows[FORCE_Y, i + 2] + couplings[i] * rows[FORCE_Y, i]
     s_xx, s_xy, s_yx, s_yy = a - s_xx, -s_xy, -s_yx, a - s_yy
+    # A division waits for the rod before, so all that can be done beside it is done before its result is used.
+    xx, xy, yx, yy = length * x * rod_x, length * x * rod_y, length * y * rod_x, length * y * rod_y
+    inverse = 1.0 / (t * (s_xx * s_yy - s_xy * s_yx) + ((s_xx * xx + s_xy * yx) + (s_yx * xy + s_yy * yy)))
+    c_xx, c_xy, c_yx, c_yy = t * s_yy + xx, xy - t * s_xy, yx - t * s_yx, t * s_xx + yy
     k_x, k_y = s_xx * x + s_xy * y, s_yx * x + s_yy * y
-    inverse = 1.0 / (t * (s_xx * s_yy - s_xy * s_yx) + length * (rod_x * k_x + rod_y * k_y))
-    t, length = t * inverse, length * inverse
-    c_xx, c_xy = t * s_yy + length * x * rod_x, length * x * rod_y - t * s_xy
-    c_yx, c_yy = length * y * rod_x - t * s_yx, t * s_xx + length * y * rod_y
-    kept[i, 0], kept[i, 1], kept[i, 2], kept[i, 3] = c_xx, c_xy, c_yx, c_yy
-    kept[i, 4], kept[i, 5], kept[i, 6], kept[i, 7] = r_x, r_y, k_x * inverse, k_y * inverse
+    kept[i, 6], kept[i, 7] = k_x * inverse, k_y * inverse
     square = out * out
+    carried_xx, carried_xy = (square * c_xx) * inverse, (square * c_xy) * inverse
+    carried_yx, carried_yy = (square * c_yx) * inverse, (square * c_yy) * inverse
+    c_xx, c_xy, c_yx, c_yy = c_xx * inverse, c_xy * inverse, c_yx * inverse, c_yy * inverse
+    kept[i, 0], kept[i, 1], kept[i, 2], kept[i, 3], kept[i, 4], kept[i, 5] = c_xx, c_xy, c_yx, c_yy, r_x, r_y
     g_x, g_y = out * (c_xx * r_x + c_xy * r_y), out * (c_yx * r_x + c_yy * r_y)
-    return square * c_xx, square * c_xy, square * c_yx, square * c_yy, g_x, g_y
+    return carried_xx, carried_xy, carried_yx, carried_yy, g_x, g_y
 
 
 @inlined
-def _substitute(
-    room: Room, along: int, i: int, out: float, x: float, y: float, worst: float
-) -> tuple[float, float, float]:
-    """Change rod i, whose neighbour's pull behind the coupling `out` changed by (x, y); its own, and the worst turn."""
+def substitute(room: Room, along: int, i: int, r_x: float, r_y: float, worst: float) -> tuple[float, float, float]:
+    """Change rod i, whose right side is (r_x, r_y) now; its own pull's change, and the worst turn."""
     rows, kept = room.rows, room.kept
-    r_x, r_y = kept[i, 4] + out * x, kept[i, 5] + out * y
     x, y = kept[i, 0] * r_x + kept[i, 1] * r_y, kept[i, 2] * r_x + kept[i, 3] * r_y
     turn = kept[i, 6] * r_y - kept[i, 7] * r_x
     rows[ANGLE, i] += turn
@@ -138,31 +145,72 @@ def _substitute(
     return x, y, (worst if size <= worst else size)  # nan is kept
 
 
+@inlined
+def meet(chain: Chain, room: Room, share: float, i: int, inner: Carried, outer: Carried) -> tuple[float, float, float]:
+    """Change rod i, at which both ends meet: how its pull changes, and its turn."""
+    s_xx, s_xy, s_yx, s_yy = inner[0] + outer[0], inner[1] + outer[1], inner[2] + outer[2], inner[3] + outer[3]
+    both, along = (s_xx, s_xy, s_yx, s_yy, inner[4] + outer[4], inner[5] + outer[5]), pulled_along(share)
+    eliminate(chain, room, along, share, i, 0.0, both)
+    return substitute(room, along, i, room.kept[i, 4], room.kept[i, 5], 0.0)
+
+
 @part
 def _iterate(chain: Chain, room: Room, angles: FloatArray, share: float) -> float:
     """One of Newton's steps; returns the largest change of an angle, rad."""
-    couplings, n = chain.couplings, len(angles)
-    middle = n // 2
-    along = ROD_Y if share == 1.0 else ALONG_Y
-    _write_forces(room.rows, angles, share, along)
+    couplings, kept, n = chain.couplings, room.kept, len(angles)
+    middle, along = n // 2, pulled_along(share)
+    write_pulls(room.rows, angles, share, 0, n)
     left = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     right = left
     for k in range(middle):
-        left = _eliminate(chain, room, along, share, k, couplings[k + 1], left)
+        left = eliminate(chain, room, along, share, k, couplings[k + 1], left)
         if k < n - 1 - middle:
-            right = _eliminate(chain, room, along, share, n - 1 - k, couplings[n - 1 - k], right)
-    s_xx, s_xy, s_yx, s_yy = left[0] + right[0], left[1] + right[1], left[2] + right[2], left[3] + right[3]
-    both = (s_xx, s_xy, s_yx, s_yy, left[4] + right[4], left[5] + right[5])
-    _eliminate(chain, room, along, share, middle, 0.0, both)
-    x, y, worst = _substitute(room, along, middle, 0.0, 0.0, 0.0, 0.0)
+            right = eliminate(chain, room, along, share, n - 1 - k, couplings[n - 1 - k], right)
+    x, y, worst = meet(chain, room, share, middle, left, right)
     right_x, right_y = x, y
     for k in range(middle):
-        i = middle - 1 - k
-        x, y, worst = _substitute(room, along, i, couplings[i + 1], x, y, worst)
+        i, out = middle - 1 - k, couplings[middle - k]
+        x, y, worst = substitute(room, along, i, kept[i, 4] + out * x, kept[i, 5] + out * y, worst)
         if k < n - 1 - middle:
-            i = middle + 1 + k
-            right_x, right_y, worst = _substitute(room, along, i, couplings[i], right_x, right_y, worst)
+            i, out = middle + 1 + k, couplings[middle + 1 + k]
+            r_x, r_y = kept[i, 4] + out * right_x, kept[i, 5] + out * right_y
+            right_x, right_y, worst = substitute(room, along, i, r_x, r_y, worst)
     return worst
+
+
+@inlined
+def keep_guess(room: Room, angles: FloatArray, first: int, last: int) -> float:
+    """Keep the guesses of rods `first` to `last` - 1; the largest turn that they have, rad."""
+    rows, turn = room.rows, 0.0
+    for i in range(first, last):
+        rows[GUESS, i] = rows[ANGLE, i]
+        turn = max(turn, abs(rows[ANGLE, i] - angles[i]))
+    return turn
+
+
+@inlined
+def settle(room: Room, share: float, first: int, last: int) -> None:
+    """Turn back the rods that went round more often than their guess, and leave them in `room`."""
+    rows = room.rows
+    for i in range(first, last):
+        turns = np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
+        rows[ANGLE, i] -= TURN * turns
+        if share < 1.0 and turns % 2.0 != 0.0:  # half a turn back, the mean of old and new points the other way
+            rows[PULL, i] = -rows[PULL, i]
+    write_rods(rows[ANGLE, first:last], rows, ROD_Y, first)
+
+
+def closed(worst: float, before: float, enough: float) -> bool:
+    """Whether Newton's method ends: what it changes, rad, is little, or no longer falls since digits end."""
+    return worst <= enough or before <= worst < _ROUNDING
+
+
+def lost(worst: float, before: float, count: int) -> bool:
+    """Whether it will not: after so many iterations before this one."""
+    return not worst < _LOST or (count > 2 and worst > before)
+
+
+_closed, _lost = inlined(closed), inlined(lost)
 
 
 @compiled
@@ -174,27 +222,17 @@ def close(chain: Chain, room: Room, angles: FloatArray, share: float, tolerance:
     square, and a formula of order 2 leaves that turn's cube. A rod that went round more often than its guess is turned
     back: a direction says nothing of full turns, the motion does. Leaves the rods in `room`.
     """
-    rows, n, before, turn = room.rows, len(angles), np.inf, 0.0
-    for i in range(n):
-        rows[GUESS, i] = rows[ANGLE, i]
-        turn = max(turn, abs(rows[ANGLE, i] - angles[i]))
-    enough = min(tolerance, turn * turn)
-    for count in range(_MOST_ITERATIONS):
+    n, before = len(angles), np.inf
+    turn = keep_guess(room, angles, 0, n)
+    for count in range(MOST_ITERATIONS):
         worst = _iterate(chain, room, angles, share)
-        if worst <= enough or before <= worst < _ROUNDING:
-            break
-        if not worst < _LOST or (count > 2 and worst > before):
+        if _closed(worst, before, min(tolerance, turn * turn)):
+            settle(room, share, 0, n)
+            return True
+        if _lost(worst, before, count):
             return False
         before = worst
-    else:
-        return False
-    for i in range(n):
-        turns = np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
-        rows[ANGLE, i] -= TURN * turns
-        if share < 1.0 and turns % 2.0 != 0.0:  # half a turn back, the mean of old and new points the other way
-            rows[PULL, i] = -rows[PULL, i]
-    write_rods(rows[ANGLE, :n], rows, ROD_Y)
-    return True
+    return False
 
 
 @part

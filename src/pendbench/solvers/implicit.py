@@ -28,6 +28,7 @@ from typing import Any
 
 from pendbench.base.arrays import FloatArray
 from pendbench.solvers.closing import Chain, close, descend
+from pendbench.solvers.halves import accept_halves, close_halves, propose_halves
 from pendbench.solvers.methods import FixedStep, Form, add
 from pendbench.solvers.rods import (
     BDF2,
@@ -37,7 +38,6 @@ from pendbench.solvers.rods import (
     FINEST,
     TURNING,
     State,
-    accelerate,
     accept,
     begin,
     miss,
@@ -74,25 +74,29 @@ SETTLED = 4
 # Changes of angles, rad, that end Newton's method: what is left is of the order of their square.
 _CLOSE, _EXACT = 3e-3, 1e-9
 
+_ONE_THREAD = (propose, close, accept)
+_TWO_THREADS = (propose_halves, close_halves, accept_halves)
+
 
 class _Run:
     """A chain and its state, for the length of a call."""
 
-    def __init__(self, chain: Chain, state: State, member: int) -> None:
+    def __init__(self, chain: Chain, state: State, member: int, threads: int) -> None:
         self.chain, self.state, self.member = chain, state, member
+        self.propose, self.close, self.accept = _ONE_THREAD if threads == 1 else _TWO_THREADS
         self.far, self.missed = FAR_OFF * float(chain.lengths.sum()), math.inf
 
     def closes(self, member: int, h: float, guess: int) -> bool:
         """Whether a step of h (s) of that member does, from that guess."""
         share, tolerance = (0.5, _EXACT) if member == CONSERVING else (1.0, _CLOSE)
-        propose(self.chain, self.state, member, h, guess)
-        return bool(close(self.chain, self.state.room, self.state.q, share, tolerance))
+        self.propose(self.chain, self.state, member, h, guess)
+        return bool(self.close(self.chain, self.state.room, self.state.q, share, tolerance))
 
     def settles(self, h: float) -> bool:
         """The same for one of order 1, however far its guess is."""
-        propose(self.chain, self.state, EULER, h, TURNING)
+        self.propose(self.chain, self.state, EULER, h, TURNING)
         descend(self.chain, self.state.room, self.state.q)
-        return bool(close(self.chain, self.state.room, self.state.q, 1.0, _CLOSE))
+        return bool(self.close(self.chain, self.state.room, self.state.q, 1.0, _CLOSE))
 
     def step(self, h: float, parts: int) -> float | None:
         """Take a step of h (s), one of so many parts: by how much the next may be longer; None: it has to be cut."""
@@ -103,15 +107,13 @@ class _Run:
                 self.missed = missed
                 return None
             if missed <= WILD * self.far or rise(self.chain, self.state, h) <= MOST_RISE:
-                if self.member == CONSERVING:
-                    accelerate(self.chain, self.state, h)
-                accept(self.chain, self.state, self.member, h)
+                self.accept(self.chain, self.state, self.member, h)
                 return 2.0 if missed < 0.1 * self.far or missed >= PAYS * self.missed else 1.0
         if self.member == CONSERVING:
             return None
         if not (self.closes(EULER, h, TURNING) or (parts >= SETTLED and self.settles(h))):
             return None
-        accept(self.chain, self.state, EULER, h)
+        self.accept(self.chain, self.state, EULER, h)
         self.state.steps[3] = self.state.steps[3] - 1 if rough else CALMING
         return 2.0
 
@@ -152,12 +154,12 @@ class _Run:
             array[:] = kept
 
 
-def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int) -> int:
-    """Take steps of dt (s), and return how many could be taken.
+def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int, threads: int = 1) -> int:
+    """Take steps of dt (s), and return how many could be taken. threads: 1, or 2 (`halves`).
 
     From Python, since a step of a long chain takes milliseconds: kernels that hold each other take long to compile.
     """
-    run, taken = _Run(chain, state, member), 0
+    run, taken = _Run(chain, state, member, threads), 0
     if state.steps[2] == 0.0:
         start(chain, state, dt)
     while taken < steps and run.frame(dt):
@@ -167,8 +169,8 @@ def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int) -
 
 
 def _method(name: str, member: int, order: int, note: str) -> FixedStep:
-    def advance(system: Any, state: State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
-        return take_steps(system, state, member, dt, steps)
+    def advance(system: Any, state: State, first: int, dt: float, steps: int, threads: int = 1) -> int:  # noqa: ARG001
+        return take_steps(system, state, member, dt, steps, threads)
 
     return FixedStep(
         name,
@@ -181,6 +183,7 @@ def _method(name: str, member: int, order: int, note: str) -> FixedStep:
         remedy="a smaller step might",
         substeps=True,
         conserves=member == CONSERVING,
+        threads=2,
     )
 
 

@@ -36,7 +36,7 @@ class FixedStep:
     advance(system, state, first, dt, steps): take the steps from number `first` on, each of dt (s), the one with number
     0 at time 0, and return how many could be taken. order: what it claims. note: a line for the documentation.
     conserves: its formula keeps the energy. stuck and remedy: what to say where a step could not be taken, and what
-    would help.
+    would help. threads: how many it can use; where more than one, the last argument of advance is how many it may.
     """
 
     name: str
@@ -44,11 +44,12 @@ class FixedStep:
     note: str
     form: Form
     begin: Callable[..., Any]
-    advance: Callable[[Any, Any, int, float, int], int]
+    advance: Callable[..., int]
     stuck: str = ""
     remedy: str = ""
     substeps: bool = False
     conserves: bool = False
+    threads: int = 1
 
 
 _added: dict[str, FixedStep] = {}

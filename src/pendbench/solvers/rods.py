@@ -210,25 +210,39 @@ def start(chain: Chain, state: State, dt: float) -> None:
     state.steps[0], state.steps[1], state.steps[2] = h, h, size
 
 
+@inlined
+def propose_some(chain: Chain, state: State, member: int, h: float, guess: int, first: int, last: int) -> None:
+    """What `propose` does, of rods `first` to `last` - 1."""
+    rows, memory, h_last, h_before = state.room.rows, state.memory, state.steps[0], state.steps[1]
+    f = _formula(member, h, h / h_last)
+    ahead = (h + h_last) / (h_last + h_before) if guess == CHANGING else 0.0
+    later = h if guess == CHANGING else 0.0
+    for axis in range(2):
+        wanted, rod, speed = (
+            rows[WANTED_X + axis, first:last],
+            memory[_ROD + axis, first:last],
+            memory[_SPEED + axis, first:last],
+        )
+        for i in range(last - first):
+            wanted[i] = f.rod * rod[i] + f.speed * speed[i]
+        if member == BDF2:
+            rod, speed = memory[_ROD_BEFORE + axis, first:last], memory[_SPEED_BEFORE + axis, first:last]
+            for i in range(last - first):
+                wanted[i] += f.rod_before * rod[i] + f.speed_before * speed[i]
+    if first == 0 < last:
+        rows[WANTED_Y, 0] -= f.scale * chain.gravity
+    angle, pull, q = rows[ANGLE, first:last], rows[PULL, first:last], state.q[first:last]
+    turned, turned_before = memory[_TURNED, first:last], memory[_TURNED_BEFORE, first:last]
+    tension, tension_rate = memory[_TENSION, first:last], memory[_TENSION_RATE, first:last]
+    for i in range(last - first):
+        angle[i] = q[i] + h * (turned[i] + ahead * (turned[i] - turned_before[i]))
+        pull[i] = f.scale * (tension[i] + later * tension_rate[i])
+
+
 @compiled
 def propose(chain: Chain, state: State, member: int, h: float, guess: int) -> None:
     """Write what a step of h (s) of a member wants, and one of the guesses."""
-    rows, memory, n, last, before = state.room.rows, state.memory, len(state.q), state.steps[0], state.steps[1]
-    f = _formula(member, h, h / last)
-    ahead = (h + last) / (last + before) if guess == CHANGING else 0.0
-    later = h if guess == CHANGING else 0.0
-    for axis in range(2):
-        for i in range(n):
-            rows[WANTED_X + axis, i] = f.rod * memory[_ROD + axis, i] + f.speed * memory[_SPEED + axis, i]
-        if member == BDF2:
-            for i in range(n):
-                rods, speeds = memory[_ROD_BEFORE + axis, i], memory[_SPEED_BEFORE + axis, i]
-                rows[WANTED_X + axis, i] += f.rod_before * rods + f.speed_before * speeds
-    rows[WANTED_Y, 0] -= f.scale * chain.gravity
-    for i in range(n):
-        rate = memory[_TURNED, i]
-        rows[ANGLE, i] = state.q[i] + h * (rate + ahead * (rate - memory[_TURNED_BEFORE, i]))
-        rows[PULL, i] = f.scale * (memory[_TENSION, i] + later * memory[_TENSION_RATE, i])
+    propose_some(chain, state, member, h, guess, 0, len(state.q))
 
 
 @compiled
@@ -261,47 +275,68 @@ def rise(chain: Chain, state: State, h: float) -> float:
     return change / scale if change > 0.0 else 0.0
 
 
-@compiled
-def accelerate(chain: Chain, state: State, h: float) -> None:
-    """Change the speeds by what pulls along the mean of old and new rods, and gravity, do in a step of h (s).
+@inlined
+def pull_along_means(state: State, h: float, first: int, last: int) -> None:
+    """Write what pulls along the mean of old and new rods do in a step of h (s)."""
+    rows = state.room.rows
+    for i in range(first, last):
+        rows[SPARE, i] = 0.5 * (state.q[i] + rows[ANGLE, i])
+    write_rods(rows[SPARE, first:last], rows, ALONG_Y, first)
+    for i in range(first, last):
+        force = 2.0 * rows[PULL, i] / h
+        rows[FORCE_X, i + 1], rows[FORCE_Y, i + 1] = force * rows[ALONG_Y + 1, i], force * rows[ALONG_Y, i]
+
+
+@inlined
+def accelerate(chain: Chain, state: State, h: float, first: int, last: int) -> None:
+    """Change the speeds by what those pulls, and gravity, do in a step of h (s).
 
     (E63) says the same by positions, whose rounding errors over h would add up where nothing damps.
     """
-    rows, couplings, n = state.room.rows, chain.couplings, len(state.q)
-    for i in range(n):
-        rows[SPARE, i] = 0.5 * (state.q[i] + rows[ANGLE, i])
-    write_rods(rows[SPARE, :n], rows, ALONG_Y)
-    for i in range(n):
-        force = 2.0 * rows[PULL, i] / h
-        rows[FORCE_X, i + 1], rows[FORCE_Y, i + 1] = force * rows[ALONG_Y + 1, i], force * rows[ALONG_Y, i]
+    rows, couplings = state.room.rows, chain.couplings
     for row, force_row in ((_SPEED, FORCE_X), (_SPEED + 1, FORCE_Y)):
-        for i in range(n):
+        for i in range(first, last):
             pulled = (couplings[i] + couplings[i + 1]) * rows[force_row, i + 1]
             pulled -= couplings[i] * rows[force_row, i] + couplings[i + 1] * rows[force_row, i + 2]
             state.memory[row, i] -= pulled
-    state.memory[_SPEED + 1, 0] -= h * chain.gravity
+    if first == 0 < last:
+        state.memory[_SPEED + 1, 0] -= h * chain.gravity
+
+
+@inlined
+def accept_some(chain: Chain, state: State, member: int, h: float, first: int, last: int) -> None:
+    """Go on to what closed, but for the speeds of the member that conserves."""
+    rows, memory = state.room.rows, state.memory
+    f = _formula(member, h, h / state.steps[0])
+    lengths = chain.lengths[first:last]
+    for axis in range(2):
+        closed = rows[ROD_X if axis == 0 else ROD_Y, first:last]
+        rod, speed = memory[_ROD + axis, first:last], memory[_SPEED + axis, first:last]
+        rod_before, speed_before = memory[_ROD_BEFORE + axis, first:last], memory[_SPEED_BEFORE + axis, first:last]
+        for i in range(last - first):
+            new, old_speed = lengths[i] * closed[i], speed[i]
+            if member != CONSERVING:
+                speed[i] = f.new * new + f.old * rod[i] + f.older * rod_before[i]
+            rod_before[i], speed_before[i] = rod[i], old_speed
+            rod[i] = new
+    angle, pull, q = rows[ANGLE, first:last], rows[PULL, first:last], state.q[first:last]
+    turned, turned_before = memory[_TURNED, first:last], memory[_TURNED_BEFORE, first:last]
+    tension, tension_rate = memory[_TENSION, first:last], memory[_TENSION_RATE, first:last]
+    for i in range(last - first):
+        turned_before[i] = turned[i]
+        turned[i] = (angle[i] - q[i]) / h
+        pulled = pull[i] / f.scale
+        tension_rate[i] = (pulled - tension[i]) / h
+        tension[i] = pulled
+        q[i] = angle[i]
 
 
 @compiled
 def accept(chain: Chain, state: State, member: int, h: float) -> None:
     """Go on to what closed."""
-    rows, memory, n = state.room.rows, state.memory, len(state.q)
-    f = _formula(member, h, h / state.steps[0])
-    for axis in range(2):
-        rod_row = ROD_X if axis == 0 else ROD_Y
-        for i in range(n):
-            rod, speed = memory[_ROD + axis, i], memory[_SPEED + axis, i]
-            new = chain.lengths[i] * rows[rod_row, i]
-            older = f.older * memory[_ROD_BEFORE + axis, i]
-            if member != CONSERVING:
-                memory[_SPEED + axis, i] = f.new * new + f.old * rod + older
-            memory[_ROD + axis, i] = new
-            memory[_ROD_BEFORE + axis, i], memory[_SPEED_BEFORE + axis, i] = rod, speed
-    for i in range(n):
-        memory[_TURNED_BEFORE, i] = memory[_TURNED, i]
-        memory[_TURNED, i] = (rows[ANGLE, i] - state.q[i]) / h
-        tension = rows[PULL, i] / f.scale
-        memory[_TENSION_RATE, i] = (tension - memory[_TENSION, i]) / h
-        memory[_TENSION, i] = tension
-        state.q[i] = rows[ANGLE, i]
+    n = len(state.q)
+    if member == CONSERVING:
+        pull_along_means(state, h, 0, n)
+        accelerate(chain, state, h, 0, n)
+    accept_some(chain, state, member, h, 0, n)
     state.steps[1], state.steps[0] = state.steps[0], h

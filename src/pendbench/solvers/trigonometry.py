@@ -82,12 +82,12 @@ def write_bends(theta: FloatArray, out: FloatArray, cosine: int, sine: int) -> N
 
 
 @inlined
-def write_directions(theta: FloatArray, out: FloatArray, cosine: int, sine: int) -> None:
-    """Write cos and sin of theta (n,) into two rows of `out` (rows, n)."""
+def write_directions(theta: FloatArray, cosines: FloatArray, sines: FloatArray) -> None:
+    """Write cos and sin of theta (n,) into the first places of two rows."""
     far = 0
     for i in range(len(theta)):
-        out[cosine, i], out[sine, i] = cosine_sine(theta[i], 0.0)
+        cosines[i], sines[i] = cosine_sine(theta[i], 0.0)
         far += int(not abs(theta[i]) <= FAR)
     if far:
         for i in range(len(theta)):
-            out[cosine, i], out[sine, i] = direction(theta[i])
+            cosines[i], sines[i] = direction(theta[i])

@@ -25,10 +25,18 @@ _GRAVITY: Final = frozenset({"gravity"})
 _FIXED: Final = fixed_step_methods()
 
 
+_THREADS: Final = "2 work side by side on the halves of the chain, which pays from some 50,000 links on"
+
+
 def _described(method: FixedStep) -> Method:
-    known = _GRAVITY if method.form in (Form.ENDS, Form.RODS) else None
+    threads = {"threads": Setting(1, 1, method.threads, integer=True, note=_THREADS)} if method.threads > 1 else {}
     return Method(
-        order=method.order, note=method.note, substeps=method.substeps, effects=known, conserves=method.conserves
+        order=method.order,
+        note=method.note,
+        settings=threads,
+        substeps=method.substeps,
+        effects=_GRAVITY if method.form in (Form.ENDS, Form.RODS) else None,
+        conserves=method.conserves,
     )
 
 
@@ -79,8 +87,9 @@ class AnalyticEngine:
         """A run at time 0. Raises ValueError where a method with a fixed step gets none."""
         from pendbench.engines.analytic import runs  # compiles or loads the kernels
 
+        given = self.methods[method].with_defaults(settings)
         if method in _FIXED:
             dt = needed_step(method, dt)
-            return runs.FixedRun(scene, _FIXED[method], dt)
+            return runs.FixedRun(scene, _FIXED[method], dt, **given)
         run = runs.Taylor if method == "taylor" else runs.Adaptive
-        return run(scene, self.methods[method].with_defaults(settings))
+        return run(scene, given)

@@ -118,10 +118,11 @@ _VARIABLES: Final[Mapping[Form, Callable[[Scene, FixedStep], _Variables]]] = {
 
 
 class FixedRun:
-    """A method with a fixed step, in the variables of its form."""
+    """A method with a fixed step, in the variables of its form. threads: how many it may use."""
 
-    def __init__(self, scene: Scene, method: FixedStep, dt: float) -> None:
+    def __init__(self, scene: Scene, method: FixedStep, dt: float, threads: float = 1) -> None:
         self._method, self._dt, self._taken, self._stuck = method, dt, 0, False
+        self._last = (int(threads),) if method.threads > 1 else ()
         self._variables = _VARIABLES[method.form](scene, method)
 
     def advance(self, steps: int) -> None:
@@ -129,7 +130,7 @@ class FixedRun:
         if self._stuck:
             return
         its = self._variables
-        taken = self._method.advance(its.system, its.state, self._taken, self._dt, steps)
+        taken = self._method.advance(its.system, its.state, self._taken, self._dt, steps, *self._last)
         self._taken += taken
         self._stuck = taken < steps
 

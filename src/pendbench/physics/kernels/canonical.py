@@ -16,7 +16,7 @@ from pendbench.solvers.trigonometry import write_bends, write_directions
 def _write_speeds(system: Any, theta: FloatArray, omega: FloatArray) -> None:
     """Leave the rods' directions and the masses' velocities in the scratch."""
     lengths, scratch = system.lengths, system.scratch
-    write_directions(theta, scratch, COSINE, SINE)
+    write_directions(theta, scratch[COSINE], scratch[SINE])
     x, y = 0.0, 0.0
     for i in range(len(lengths)):
         speed = lengths[i] * omega[i]
