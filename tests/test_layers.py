@@ -90,7 +90,7 @@ ONLY = {
     # The source of what runs in workers is in every key, and so is all that it imports: pages are not.
     **{f"kinds.{name}.work": {part for parts in FLOORS[:-4] for part in parts} for name in kinds()},
     # Errors and times are taken in separate runs, by modules that do not meet.
-    "measures.clock": {"base.arrays", "base.faults", "engines.protocol", "scene"},
+    "measures.clock": {"base.arrays", "base.faults", "base.second_thread", "engines.protocol", "scene"},
     "measures.orders": {"base.arrays"},
     "measures.prices": {"base.arrays"},
     "measures.divergence": {"base.arrays"},
@@ -119,7 +119,8 @@ RESERVED = {
     "argcomplete": {"__main__", "commands"},
     "distributed": {"execution"},
     "flint": {"truth.proof"},
-    "time": {"measures.clock", "execution.connect", "truth.proof.enclose"},  # the second only waits
+    # `execution.connect` only waits.
+    "time": {"measures.clock", "base.second_thread", "execution.connect", "truth.proof.enclose"},
     "datetime": set(),
     "psutil": {"study", "base.processes"},
     "pydantic": {"base.strict", "scene.toml_file", "study", "kinds", "commands.pages"},

@@ -12,6 +12,7 @@ import numpy as np
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.faults import Fault
+from pendbench.base.second_thread import spent_beside
 from pendbench.engines.protocol import AdaptiveSimulation, Engine, Simulation, State
 from pendbench.scene.scene import Scene
 
@@ -20,7 +21,7 @@ T = TypeVar("T")
 REPEATS = 5
 _READINGS = 200
 _MOST_RUNS = 100  # that are put together for one sample, where each is short
-_OTHERS, _TICKS = 1.2, 0.1  # of a thread's own time, and s, beyond which a process's time is that of others, too
+_OTHERS, _TICKS = 1.2, 0.1  # of our threads' own time, and s, beyond which a process's time is that of others, too
 _LONGER = 1.5  # what twice the steps take at least, over what the steps took, where it is steps that are timed
 _CALL_S = 0.05  # what no call takes but for its steps
 _SAMPLE_S = 0.01  # a sample shorter than this is mostly the clock's own noise
@@ -188,20 +189,25 @@ def race(
     return Race(float(times[-1]), watch.spent, lost=False)
 
 
+def _own_time() -> float:
+    """Processor time of this thread and of the one that works beside it, s."""
+    return time.thread_time() + spent_beside()
+
+
 class _Stopwatch:
     """Processor time of blocks, s. Where a process has a limit of it, its clock goes by the system's ticks of some
-    milliseconds; that of a thread does not, and is taken unless other threads have worked as well.
+    milliseconds; that of a thread does not, and is taken unless threads have worked that are not our own.
     """
 
     def __init__(self) -> None:
         self._own, self._whole = 0.0, 0.0
 
     def __enter__(self) -> None:
-        self._begun = time.thread_time(), time.process_time()
+        self._begun = _own_time(), time.process_time()
 
     def __exit__(self, *_: object) -> None:
         own, whole = self._begun
-        self._own += time.thread_time() - own
+        self._own += _own_time() - own
         self._whole += time.process_time() - whole
 
     @property

@@ -96,7 +96,7 @@ def _rounding_error(system: Any, t: float, h: float, y: FloatArray, room: _Room)
     worst = 0.0
     for i in range(len(y)):
         size = abs(out[i] - room.k[0, i]) * room.fineness[i]
-        worst = worst if size <= worst else size  # nan is kept
+        worst = size if size > worst or np.isnan(size) else worst  # nan is kept
     return abs(h) * worst if worst < np.inf else 0.0
 
 

@@ -142,7 +142,7 @@ def substitute(room: Room, along: int, i: int, r_x: float, r_y: float, worst: fl
     rows[ANGLE, i] += turn
     rows[PULL, i] += rows[along + 1, i] * x + rows[along, i] * y
     size = abs(turn)
-    return x, y, (worst if size <= worst else size)  # nan is kept
+    return x, y, (size if size > worst or np.isnan(size) else worst)  # nan is kept
 
 
 @inlined

@@ -118,14 +118,18 @@ def _substitute_half(
     return worst
 
 
+def largest(*turns: float) -> float:
+    """The largest of them, or nan."""
+    return math.nan if any(map(math.isnan, turns)) else max(turns)
+
+
 def _iterate(chain: Chain, room: Room, angles: FloatArray, share: float) -> float:
     """One of Newton's steps; returns the largest change of an angle, rad, or nan."""
     its = (chain, room, angles, share)
     _pull_middle(room, angles, share)
     left, right = both(_eliminate_half, (*its, False), (*its, True))
     x, y, turn = _meet(*its, left, right)
-    turns = (turn, *both(_substitute_half, (*its, x, y, False), (*its, x, y, True)))
-    return math.nan if any(map(math.isnan, turns)) else max(turns)
+    return largest(turn, *both(_substitute_half, (*its, x, y, False), (*its, x, y, True)))
 
 
 def propose_halves(chain: Chain, state: State, member: int, h: float, guess: int) -> None:

@@ -153,7 +153,8 @@ def _improve(method: Collocation, factors: Any, pivots: Any, residuals: FloatArr
     for s in range(stages):
         for i in range(d):
             rates[s, i] += changes[s, i]
-            largest = largest if abs(changes[s, i]) <= largest else abs(changes[s, i])  # nan is kept
+            size = abs(changes[s, i])
+            largest = size if size > largest or np.isnan(size) else largest  # nan is kept
     return largest
 
 

@@ -39,6 +39,9 @@ NO_STEP = -1.0
 # of four orders in a row can be zero.
 _LAST_ORDERS = 4
 
+# log2 of the smallest number: a term of a motion so slow that it is 0 is below it.
+_LEAST = -1074.0
+
 
 class Series(NamedTuple):
     """A state and how it goes on.
@@ -69,28 +72,41 @@ def order_for(tolerance: float) -> int:
 
 
 @inlined
+def _moves(v: FloatArray) -> bool:
+    """Whether any term of the series v (order + 1, d) changes the rates."""
+    for k in range(1, len(v)):
+        for i in range(v.shape[1]):
+            if v[k, i] != 0.0:
+                return True
+    return False
+
+
+@inlined
 def _reach(v: FloatArray, allowed: float, relative: float, shares: FloatArray) -> float:
     """How long (s) the series v (order + 1, d) holds; nan where it is not finite, inf where nothing moves.
 
     allowed: log2 of the tolerance over the number of the first order left out; shares: 1 / (k + 1). Each of the last
     orders limits the step by what it adds to q and by what it adds to v. And terms have to fall: close to an
-    equilibrium the last ones can be as small as you like while those that are left out are larger.
+    equilibrium the last ones can be as small as you like while those that are left out are larger. A nan anywhere
+    makes it nan.
     """
     order = len(v) - 1
     most, late = -np.inf, 0.0
     for k in range(max(1, order - _LAST_ORDERS + 1), order + 1):
-        worst_q, worst_v = 0.0, 0.0
+        worst_q, worst_v, unknown = 0.0, 0.0, 0
         for i in range(v.shape[1]):
             size = abs(v[k, i])
             scaled = size / (1.0 + relative * abs(v[0, i]))
-            worst_v = worst_v if scaled <= worst_v else scaled  # nan is kept
+            worst_v = worst_v if scaled <= worst_v else scaled
             worst_q = worst_q if size <= worst_q else size
-        if not worst_v < np.inf:
+            unknown += int(not scaled < np.inf)
+        if unknown:
             return np.nan
-        most = max(most, rough_log2(worst_v) * shares[k - 1], rough_log2(worst_q * shares[k]) * shares[k])
+        if worst_v > 0.0:
+            most = max(most, rough_log2(worst_v) * shares[k - 1], rough_log2(worst_q * shares[k]) * shares[k])
         late += worst_q
     if late == 0.0:
-        return np.inf
+        return float(2.0 ** (allowed - _LEAST * shares[order])) if _moves(v) else np.inf
     early = 0.0
     for k in range(max(0, order - 2 * _LAST_ORDERS + 1), order - _LAST_ORDERS + 1):
         for i in range(v.shape[1]):
