@@ -29,7 +29,16 @@ from pendbench.solvers.closing import (
     substitute,
     write_pulls,
 )
-from pendbench.solvers.rods import CONSERVING, State, accelerate, accept_some, propose_some, pull_along_means
+from pendbench.solvers.rods import (
+    CONSERVING,
+    EULER,
+    State,
+    accelerate,
+    accept_some,
+    propose_some,
+    pull_along_means,
+    rise,
+)
 
 _Result = TypeVar("_Result")
 
@@ -160,3 +169,11 @@ def accept_halves(chain: Chain, state: State, member: int, h: float) -> None:
         _each_half(_accelerate, chain, state, h, rods=n)
     _each_half(_accept, chain, state, member, h, rods=n)
     state.steps[1], state.steps[0] = state.steps[0], h
+
+
+def accept_calm_halves(chain: Chain, state: State, h: float, most: float) -> bool:
+    """The same as `rods.accept_calm`."""
+    if most < math.inf and rise(chain, state, EULER, h) > most:
+        return False
+    accept_halves(chain, state, EULER, h)
+    return True

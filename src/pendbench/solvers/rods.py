@@ -29,6 +29,7 @@ from pendbench.solvers.closing import (
     room_for,
     write_rods,
 )
+from pendbench.solvers.projection import across, solve_rods
 
 #: A step is cut into so many parts at most.
 FINEST = 1024
@@ -98,57 +99,6 @@ def _formula(member: int, h: float, ratio: float) -> _Formula:
     )
 
 
-@inlined
-def _solve_rods(chain: Chain, rows: FloatArray, n: int) -> None:
-    """Forces along the rods (ROD of `rows`) that change their speeds along them by SPARE, in place.
-
-    The change of rod i is a_i f_i - c_(i+1) f_(i+1) - c_i f_(i-1), with f along the rods.
-    """
-    couplings, middle = chain.couplings, n // 2
-    for i in range(1, n):
-        beside = rows[ROD_X, i] * rows[ROD_X, i - 1] + rows[ROD_Y, i] * rows[ROD_Y, i - 1]
-        rows[FORCE_X, i], rows[FORCE_Y, i] = -couplings[i] * beside, couplings[i] + couplings[i + 1]
-    rows[FORCE_X, 0], rows[FORCE_X, n], rows[FORCE_Y, 0] = 0.0, 0.0, couplings[1]
-    before, after, pull, pull_after = 0.0, 0.0, 0.0, 0.0
-    for k in range(middle):  # from both ends: while one waits for a division, the other goes on
-        ratio = rows[FORCE_X, k] * before
-        before, pull = 1.0 / (rows[FORCE_Y, k] - ratio * rows[FORCE_X, k]), rows[SPARE, k] - ratio * pull
-        rows[PULL, k], rows[SPARE, k] = before, pull
-        i = n - 1 - k
-        if i > middle:
-            ratio = rows[FORCE_X, i + 1] * after
-            after = 1.0 / (rows[FORCE_Y, i] - ratio * rows[FORCE_X, i + 1])
-            pull_after = rows[SPARE, i] - ratio * pull_after
-            rows[PULL, i], rows[SPARE, i] = after, pull_after
-    inner, outer = rows[FORCE_X, middle], rows[FORCE_X, middle + 1]
-    pull = rows[SPARE, middle] - inner * before * pull - outer * after * pull_after
-    pull /= rows[FORCE_Y, middle] - inner * inner * before - outer * outer * after
-    rows[SPARE, middle], pull_after = pull, pull
-    for k in range(middle):
-        i = middle - 1 - k
-        pull = (rows[SPARE, i] - rows[FORCE_X, i + 1] * pull) * rows[PULL, i]
-        rows[SPARE, i] = pull
-        i = middle + 1 + k
-        if i < n:
-            pull_after = (rows[SPARE, i] - rows[FORCE_X, i] * pull_after) * rows[PULL, i]
-            rows[SPARE, i] = pull_after
-    for i in range(n):
-        rows[FORCE_X, i + 1] = rows[SPARE, i] * rows[ROD_X, i]
-        rows[FORCE_Y, i + 1] = rows[SPARE, i] * rows[ROD_Y, i]
-    for i in (0, n + 1):
-        rows[FORCE_X, i], rows[FORCE_Y, i] = 0.0, 0.0
-
-
-@inlined
-def _across(chain: Chain, rows: FloatArray, i: int, x: float, y: float) -> float:
-    """How fast rod i turns with (x, y) less what FORCE does to it, over a length."""
-    c_in, c_out = chain.couplings[i], chain.couplings[i + 1]
-    x -= (c_in + c_out) * rows[FORCE_X, i + 1] - c_in * rows[FORCE_X, i] - c_out * rows[FORCE_X, i + 2]
-    y -= (c_in + c_out) * rows[FORCE_Y, i + 1] - c_in * rows[FORCE_Y, i] - c_out * rows[FORCE_Y, i + 2]
-    across: float = rows[ROD_X, i] * y - rows[ROD_Y, i] * x
-    return across / float(chain.lengths[i])
-
-
 @compiled
 def write_rates(chain: Chain, state: State) -> None:
     """The rates of the motion nearest to the speeds that keeps the rods' lengths. equations.md, (E64)."""
@@ -156,9 +106,9 @@ def write_rates(chain: Chain, state: State) -> None:
     for i in range(n):
         rows[ROD_X, i], rows[ROD_Y, i] = memory[_ROD, i] / chain.lengths[i], memory[_ROD + 1, i] / chain.lengths[i]
         rows[SPARE, i] = rows[ROD_X, i] * memory[_SPEED, i] + rows[ROD_Y, i] * memory[_SPEED + 1, i]
-    _solve_rods(chain, rows, n)
+    solve_rods(chain, rows, n)
     for i in range(n):
-        state.v[i] = _across(chain, rows, i, memory[_SPEED, i], memory[_SPEED + 1, i])
+        state.v[i] = across(chain, rows, i, memory[_SPEED, i], memory[_SPEED + 1, i])
 
 
 @inlined
@@ -190,12 +140,12 @@ def start(chain: Chain, state: State, dt: float) -> None:
         pull = -chain.gravity * rows[ROD_Y, i] if i == 0 else 0.0
         memory[_TENSION, i] = pull + chain.lengths[i] * state.v[i] * state.v[i]
         rows[SPARE, i] = memory[_TENSION, i]
-    _solve_rods(chain, rows, n)
+    solve_rods(chain, rows, n)
     size, most = FINEST, 0.0
     for i in range(n):
         memory[_TENSION, i] = rows[SPARE, i]
         fall = -chain.gravity if i == 0 else 0.0
-        rows[WANTED_X, i] = _across(chain, rows, i, 0.0, fall)
+        rows[WANTED_X, i] = across(chain, rows, i, 0.0, fall)
         most = max(most, abs(rows[WANTED_X, i]))
     while size > 1 and (dt * size / FINEST) ** 2 * most > _FIRST_TURN:
         size //= 2
@@ -259,9 +209,12 @@ def miss(chain: Chain, state: State, h: float) -> float:
 
 
 @compiled
-def rise(chain: Chain, state: State, h: float) -> float:
-    """By how much a step of `bdf2` raises the energy, over the kinetic one before it and the weights' largest."""
-    rows, memory, f = state.room.rows, state.memory, _formula(BDF2, h, h / state.steps[0])
+def rise(chain: Chain, state: State, member: int, h: float) -> float:
+    """By how much a step of `bdf2` or `implicit_euler` raises the energy.
+
+    Over the kinetic energy before it and the largest of the weights.
+    """
+    rows, memory, f = state.room.rows, state.memory, _formula(member, h, h / state.steps[0])
     x, y, new_x, new_y, height, reach, change, scale = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(state.q)):
         length, mass = chain.lengths[i], 1.0 / chain.couplings[i + 1]
@@ -340,3 +293,12 @@ def accept(chain: Chain, state: State, member: int, h: float) -> None:
         accelerate(chain, state, h, 0, n)
     accept_some(chain, state, member, h, 0, n)
     state.steps[1], state.steps[0] = state.steps[0], h
+
+
+@compiled
+def accept_calm(chain: Chain, state: State, h: float, most: float) -> bool:
+    """Go on to what closed with order 1, unless that raises the energy by more than `most` (`rise`); whether it did."""
+    if most < np.inf and rise(chain, state, EULER, h) > most:
+        return False
+    accept(chain, state, EULER, h)
+    return True
