@@ -16,7 +16,7 @@ _LOG2 = (-2.50561466, 4.04961689, -2.09940228, 0.63551112, -0.08001088)
 
 @inlined
 def rough_log2(x: float) -> float:
-    """log2 of x > 0 to 1e-4, in half the time of the exact one; below -1022 for what is no normal number, and 0."""
+    """log2 of a normal x > 0 to 1e-4, in half the time of the exact one; below -1022 for 0 and what is smaller."""
     bits = np.float64(x).view(np.int64)
     m = np.int64((bits & _MANTISSA) | _EXPONENT_OF_ONE).view(np.float64)
     square = m * m

@@ -20,12 +20,11 @@ _LIMITS: Final = {
 
 _TAYLOR: Final = "Taylor series, 4 orders and 0.9 for each digit of the tolerance; the order claimed is the default's"
 
+_THREADS: Final = "2 work side by side on the halves of the chain, which pays from some 30,000 links on"
+
 _GRAVITY: Final = frozenset({"gravity"})
 
 _FIXED: Final = fixed_step_methods()
-
-
-_THREADS: Final = "2 work side by side on the halves of the chain, which pays from some 50,000 links on"
 
 
 def _described(method: FixedStep) -> Method:
