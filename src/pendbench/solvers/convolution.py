@@ -23,7 +23,7 @@ cgutils: Any = numba_cgutils  # has no types
 #: How many doubles make a vector: 256 bits, which every processor of the last ten years has.
 WIDTH = 4
 
-Kernel = Callable[[FloatArray, FloatArray, int, int, FloatArray], None]
+Kernel = Callable[[FloatArray, FloatArray, int, int, FloatArray, int, int], None]
 
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _ONCE = ("contract",)  # a product and a sum are rounded once
@@ -39,65 +39,113 @@ def factors(count: int, orders: int, lanes: int) -> FloatArray:
 
 
 def convolution(lanes: int) -> Kernel:
-    """For `lanes` products, a multiple of `WIDTH`, the kernel that adds up their inner terms.
+    """For `lanes` products, a multiple of `WIDTH`, the kernel that adds up their inner terms, two orders at a time.
 
-    It is `inner(left, right, i, k, out)`: write the sum of `left[i, j] right[i, k - j]` over j = 1 .. k - 1 into
-    `out[i]`; left and right are (count, orders, lanes), out (count, lanes). The outer terms, j = 0 and j = k, hold what
-    is not yet known, and are the caller's. Orders that have only just been written are read last, so that the sums
-    of one order begin while the order before is being finished.
+    Half of what the sums of an order cost is to read the factors, and those of the next are made of the same numbers.
+    `inner(left, right, i, k, sums, even, odd)` leaves the sum of `left[i, j] right[i, k - j]` over j = 1 .. k - 1 in
+    `sums[even]`, where k is even, or in `sums[odd]`. For an even order it writes what is known of the next one, the
+    terms from j = 2 on, into `sums[odd]`, and for that one it adds the rest: so the orders have to come in turn. left
+    and right are (count, orders, lanes), sums (rows, lanes). The outer terms, j = 0 and j = k, hold what is not yet
+    known, and are the caller's.
     """
-    registers = lanes // WIDTH
 
     @intrinsic
-    def inner(typingctx: Any, left: Any, right: Any, i: Any, k: Any, out: Any) -> Any:  # noqa: ARG001
+    def inner(typingctx: Any, left: Any, right: Any, i: Any, k: Any, sums: Any, even: Any, odd: Any) -> Any:  # noqa: ARG001
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, args: Sequence[Any]) -> Any:
-            arrays = {at: context.make_array(signature.args[at])(context, builder, args[at]) for at in (0, 1, 4)}
-            left_rows, right_rows = (_Rows(builder, arrays[at], args[2], registers) for at in (0, 1))
-            sums = _inner_terms(builder, left_rows, right_rows, args[3])
-            target = _vectors(builder, arrays[4].data, builder.mul(args[2], args[2].type(lanes)), registers)
-            for value, pointer in zip(sums, target, strict=True):
-                builder.store(value, pointer, align=8)
+            arrays = [context.make_array(signature.args[at])(context, builder, args[at]) for at in (0, 1, 4)]
+            x, y = (_Factors(builder, side, args[2], lanes) for side in arrays[:2])
+            own, ahead = (_Sums(builder, arrays[2].data, row, lanes) for row in args[5:])
+            k = args[3]
+            with builder.if_else(builder.trunc(k, ir.IntType(1))) as (is_odd, is_even):
+                with is_odd:
+                    _add_rest(builder, x, y, k, ahead)
+                with is_even:
+                    _add_two_orders(builder, x, y, k, own, ahead)
+                    own.write()
+            ahead.write()
             return context.get_dummy_value()
 
-        return types.void(left, right, i, k, out), generate
+        return types.void(left, right, i, k, sums, even, odd), generate
 
     return cast(Kernel, inner)
 
 
-def _vectors(builder: ir.IRBuilder, data: ir.Value, offset: ir.Value, registers: int) -> list[ir.Value]:
+def _vectors(builder: ir.IRBuilder, data: ir.Value, offset: ir.Value, lanes: int) -> list[ir.Value]:
     first = builder.bitcast(builder.gep(data, [offset]), _VECTOR.as_pointer())
-    return [builder.gep(first, [offset.type(at)]) for at in range(registers)]
+    return [builder.gep(first, [offset.type(at)]) for at in range(lanes // WIDTH)]
 
 
-class _Rows:
-    """The rows of orders `array[i]` in the code being generated."""
+class _Factors:
+    """The orders of factors `array[i]` in the code being generated."""
 
-    def __init__(self, builder: ir.IRBuilder, array: Any, i: ir.Value, registers: int) -> None:
-        orders, lanes = cgutils.unpack_tuple(builder, array.shape)[1:]
-        self._builder, self._data, self._registers, self._lanes = builder, array.data, registers, lanes
+    def __init__(self, builder: ir.IRBuilder, array: Any, i: ir.Value, lanes: int) -> None:
+        orders = cgutils.unpack_tuple(builder, array.shape)[1]
+        self._builder, self._data, self._lanes = builder, array.data, lanes
         self._first = builder.mul(i, orders)
 
     def load(self, order: ir.Value) -> list[ir.Value]:
         """The registers of one order."""
-        offset = self._builder.mul(self._builder.add(self._first, order), self._lanes)
-        pointers = _vectors(self._builder, self._data, offset, self._registers)
-        return [self._builder.load(pointer, align=8) for pointer in pointers]
+        offset = self._builder.mul(self._builder.add(self._first, order), order.type(self._lanes))
+        return [self._builder.load(at, align=8) for at in _vectors(self._builder, self._data, offset, self._lanes)]
 
 
-def _inner_terms(builder: ir.IRBuilder, left: _Rows, right: _Rows, k: ir.Value) -> list[ir.Value]:
-    one, two = k.type(1), k.type(2)
+class _Sums:
+    """Sums in registers, which end as `array[i]`."""
+
+    def __init__(self, builder: ir.IRBuilder, data: ir.Value, i: ir.Value, lanes: int) -> None:
+        self._builder = builder
+        self._rows = _vectors(builder, data, builder.mul(i, i.type(lanes)), lanes)
+        self._totals = [cgutils.alloca_once_value(builder, _VECTOR([0.0] * WIDTH)) for _ in self._rows]
+
+    def add(self, left: Sequence[ir.Value], right: Sequence[ir.Value]) -> None:
+        """The products of two orders."""
+        for total, x, y in zip(self._totals, left, right, strict=True):
+            product = self._builder.fmul(x, y, flags=_ONCE)
+            self._builder.store(self._builder.fadd(product, self._builder.load(total), flags=_ONCE), total)
+
+    def take_up(self) -> None:
+        """Go on from what is in the array."""
+        for total, row in zip(self._totals, self._rows, strict=True):
+            self._builder.store(self._builder.load(row, align=8), total)
+
+    def write(self) -> None:
+        """Write them into the array."""
+        for total, row in zip(self._totals, self._rows, strict=True):
+            self._builder.store(self._builder.load(total), row, align=8)
+
+
+def _add_two_orders(
+    builder: ir.IRBuilder, left: _Factors, right: _Factors, k: ir.Value, own: _Sums, ahead: _Sums
+) -> None:
+    """Of an even order. What has only just been written is read last, so that sums begin while that is finished."""
+    one, two, three = k.type(1), k.type(2), k.type(3)
+    last, but_one = builder.sub(k, one), builder.sub(k, two)
+    with builder.if_else(builder.icmp_signed("==", k, two)) as (is_two, is_more):
+        with is_two:
+            own.add(left.load(one), right.load(one))
+        with is_more:
+            before = right.load(but_one)
+            own.add(left.load(two), before)
+            kept = [cgutils.alloca_once_value(builder, register) for register in before]
+            with cgutils.for_range_slice(builder, three, last, one) as (j, _):
+                x, y = left.load(j), right.load(builder.sub(k, j))
+                own.add(x, y)
+                ahead.add(x, [builder.load(register) for register in kept])
+                for register, value in zip(kept, y, strict=True):
+                    builder.store(value, register)
+            recent = right.load(last)
+            own.add(left.load(one), recent)
+            ahead.add(left.load(two), recent)
+            recent = left.load(last)
+            own.add(recent, right.load(one))
+            ahead.add(recent, right.load(two))
+
+
+def _add_rest(builder: ir.IRBuilder, left: _Factors, right: _Factors, k: ir.Value, ahead: _Sums) -> None:
+    """Of an odd order, which has no inner terms where it is 1."""
+    one = k.type(1)
     last = builder.sub(k, one)
-    sums = [cgutils.alloca_once_value(builder, _VECTOR([0.0] * WIDTH)) for _ in left.load(one)]
-
-    def add_term(j: ir.Value, other: ir.Value) -> None:
-        for total, x, y in zip(sums, left.load(j), right.load(other), strict=True):
-            product = builder.fmul(x, y, flags=_ONCE)
-            builder.store(builder.fadd(product, builder.load(total), flags=_ONCE), total)
-
-    with cgutils.for_range_slice(builder, two, last, one) as (j, _):
-        add_term(j, builder.sub(k, j))
     with builder.if_then(builder.icmp_signed(">", k, one)):
-        add_term(one, last)
-    with builder.if_then(builder.icmp_signed(">", k, two)):
-        add_term(last, one)
-    return [builder.load(total) for total in sums]
+        ahead.take_up()
+        ahead.add(left.load(one), right.load(last))
+        ahead.add(left.load(last), right.load(one))
