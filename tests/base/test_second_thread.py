@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -25,6 +26,18 @@ def work():
 
 both(abs, (1,), (2,))
 threading.Thread(target=work).start()
+"""
+
+# A process that has used its second thread, and another that comes from it by a fork.
+FORKED = """
+import os
+from pendbench.base.second_thread import both
+
+both(abs, (1,), (2,))
+child = os.fork()
+if child == 0:
+    os._exit(0 if both(abs, (-3,), (-4,)) == (3, 4) else 1)
+raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 """
 
 
@@ -88,6 +101,12 @@ def test_an_interrupt_while_waiting_is_raised_when_the_other_is_done():
 def test_a_thread_that_outlives_the_main_one_has_it_too():
     done = subprocess.run([sys.executable, "-c", OUTLIVING], capture_output=True, text=True, timeout=LONG, check=False)
     assert (done.stdout.strip(), done.stderr) == ("(2, 4)", "")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_forked_process_has_one_of_its_own():
+    done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, timeout=LONG, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_its_processor_time_is_known():

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -20,22 +17,6 @@ from support.scenes import chain, random_chain
 
 METHODS = ["implicit_euler", "bdf2", "energy_momentum"]
 FRAME = 1 / 240
-
-# A process that used its second thread, and another that came from it by a fork.
-FORKED = """
-import os, sys
-import numpy as np
-import pendbench as pb
-
-def run():
-    return pb.simulate("rope1000", method="bdf2", dt=1 / 240, times=[0.0, 1 / 240], threads=2).theta
-
-before = run()
-child = os.fork()
-if child == 0:
-    os._exit(0 if np.array_equal(run(), before) else 1)
-sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-"""
 
 
 def both(scene, method, dt, steps):
@@ -148,12 +129,6 @@ def test_runs_beside_each_other_keep_to_themselves():
         found = list(pool.map(lambda scene: run(scene, 2), scenes))
     for scene, theta in zip(scenes, found, strict=True):
         np.testing.assert_allclose(theta, run(scene, 1), rtol=0, atol=1e-9)
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
-def test_a_forked_process_has_a_second_thread_of_its_own():
-    done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("threads", [0, 3, 1.5])
