@@ -259,6 +259,14 @@ def test_other_threads_count_in_a_race_and_ticks_do_not(monkeypatch, own, spent)
     assert race(engine, SCENE, "any", 0.01, {}, TENTHS, lambda *_: False).spent == pytest.approx(spent)
 
 
+def test_the_thread_that_works_beside_is_one_of_ours_in_a_race(monkeypatch):
+    """100 steps of 10 ms of the process, of which this thread had 6 and the other 3.5."""
+    engine, watch = ticking(monkeypatch, Racing, (0.01, 9.0))
+    monkeypatch.setattr(clock.time, "thread_time", lambda: 0.6 * watch.now)
+    monkeypatch.setattr(clock, "spent_beside", lambda: 0.35 * watch.now)
+    assert race(engine, SCENE, "any", 0.01, {}, TENTHS, lambda *_: False).spent == pytest.approx(0.95)
+
+
 def test_a_call_is_timed_by_the_processor(monkeypatch):
     ticks = iter([3.0, 3.5])
     monkeypatch.setattr(clock, "time", SimpleNamespace(process_time=lambda: next(ticks)))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pendbench.base.errors import InputError
-from pendbench.base.second_thread import spent_beside
+from pendbench.base.second_thread import both as share
 from pendbench.engines.recording import simulate
 from pendbench.solvers import closing, halves
 from support.kernels import called
@@ -103,12 +103,13 @@ def test_it_ends_where_changes_are_small_or_digits_end():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_second_thread_works_where_it_is_asked_for_and_nowhere_else(method):
-    scene, before = random_chain(50, seed=1), spent_beside()
+def test_work_is_shared_where_that_is_asked_for_and_nowhere_else(method, monkeypatch):
+    scene, shared = random_chain(50, seed=1), []
+    monkeypatch.setattr(halves, "both", lambda kernel, *each: shared.append(kernel) or share(kernel, *each))
     simulate(scene, method=method, dt=1e-3, times=[0.0, 0.01])
-    assert spent_beside() == before
+    assert not shared
     simulate(scene, method=method, dt=1e-3, times=[0.0, 0.01], threads=2)
-    assert spent_beside() > before
+    assert {halves._eliminate_half, halves._substitute_half} < set(shared)
 
 
 def test_both_threads_run_at_the_same_time():

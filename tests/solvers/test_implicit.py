@@ -319,8 +319,9 @@ def test_a_start_that_no_angles_close_is_a_status() -> None:
     assert run.health() == (status, reason)
 
 
+@pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("seed", [612, 1154, 1869, 2355, 2548])
-def test_the_floor_raises_no_energy_where_rods_push(seed: int) -> None:
+def test_the_floor_raises_no_energy_where_rods_push(seed: int, threads: int) -> None:
     """Chains that gained 60 % to 64,000 % in 30 steps when nobody asked."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 30))
@@ -329,7 +330,23 @@ def test_the_floor_raises_no_energy_where_rods_push(seed: int) -> None:
     its = Rods(chain(n, mass=mass, length=length, angle=angle, rate=rate, gravity=None), "implicit_euler")
     energies = []
     for _ in range(30):
-        assert its.steps(0.02, 1) == 1
+        assert its.method.advance(its.chain, its.state, 0, 0.02, 1, threads) == 1
         energies.append(its.energy())
     risen = np.array(energies) - np.minimum.accumulate(energies)
     assert risen.max() < 0.01 * energies[0]
+
+
+@pytest.mark.parametrize("scene", [chain(2, angle=[0.3, 2.0], gravity=None), chain(1, angle=0.7, gravity=None)])
+def test_a_chain_at_rest_is_not_cut_for_the_energy_of_its_rounding(scene: Scene, monkeypatch) -> None:
+    tried = []
+    step = implicit._Run.step
+    monkeypatch.setattr(implicit._Run, "step", lambda run, h, parts: tried.append(parts) or step(run, h, parts))
+    its = Rods(scene, "implicit_euler")
+    assert its.steps(FRAME, 60) == 60
+    assert tried == [1] * 60
+    assert np.abs(its.state.v).max() < 1e-12
+
+
+def test_the_finest_part_of_a_step_is_taken_whatever_it_gains(monkeypatch) -> None:
+    monkeypatch.setattr(implicit, "MOST_RISE", -1.0)
+    assert Rods(rope(5), "implicit_euler").steps(FRAME, 2) == 2

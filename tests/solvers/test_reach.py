@@ -43,7 +43,7 @@ def falling(d=3, seed=0):
 @pytest.mark.parametrize("seed", range(5))
 def test_each_of_the_last_orders_limits_it(seed, relative):
     v = falling(seed=seed)
-    v[0] *= 1e4
+    v[0] *= 3.0
     assert reach(v, relative) == pytest.approx(rule(v, relative), rel=ROUGH)
     v[ORDER - seed % 4] *= 100.0
     assert reach(v, relative) == pytest.approx(rule(v, relative), rel=ROUGH)
@@ -54,6 +54,14 @@ def test_terms_have_to_fall():
     v[: ORDER - 3] *= 1e-20
     early, late = np.abs(v[ORDER - 7 : ORDER - 3]).max(), np.abs(v[-4:]).max(axis=1).sum()
     assert reach(v) == pytest.approx(0.5 * (early / late) ** 0.25)
+
+
+@pytest.mark.parametrize(("fall", "limits"), [(0.8, True), (1.2, False)])
+def test_how_far_they_have_to_fall(fall, limits):
+    v = falling()
+    late, last = np.abs(v[-4:]).max(axis=1).sum(), slice(ORDER - 7, ORDER - 3)
+    v[last] *= late * (2.0 * fall * rule(v)) ** 4 / np.abs(v[last]).max()
+    assert reach(v) == pytest.approx((fall if limits else 1.0) * rule(v), rel=ROUGH)
 
 
 def test_where_nothing_came_before_nothing_has_to_fall():

@@ -9,25 +9,30 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from functools import cache
 from queue import SimpleQueue
-from threading import Lock, Thread
+from threading import Lock, Thread, get_ident
 from typing import Any, Generic, TypeVar
 
 _Result = TypeVar("_Result")
 
 
 class _Task(Generic[_Result]):
-    """A call, and what became of it."""
+    """A call, and what became of it. Whoever takes it up first calls it: the second thread, or who asked."""
 
     def __init__(self, kernel: Callable[..., _Result], args: tuple[Any, ...]) -> None:
-        self._kernel, self._args, self._over, self._ended = kernel, args, False, Lock()
+        self._kernel, self._args, self._over = kernel, args, False
+        self._takers: dict[str, int] = {}
+        self._ended = Lock()
         self._values: list[_Result] = []
         self._error: BaseException | None = None
         self._ended.acquire()
 
+    def take_up(self) -> bool:
+        """Whether this thread is the first to."""
+        return self._takers.setdefault("first", get_ident()) == get_ident()
+
     def call(self) -> None:
-        """In the second thread."""
+        """By whoever took it up."""
         try:
             self._values.append(self._kernel(*self._args))
         except BaseException as error:
@@ -39,7 +44,7 @@ class _Task(Generic[_Result]):
         self._ended.release()
 
     def wait(self) -> None:
-        """Until it is over, whatever interrupts: it writes into arrays of the one who asked."""
+        """Until the second thread, which took it up, has done it, interrupt or not: it writes into others' arrays."""
         interrupt = None
         while not self._over:
             try:
@@ -60,42 +65,66 @@ class _Second:
     """The thread, which does one task after another. spent: its processor time, s, up to the end of the last."""
 
     def __init__(self) -> None:
-        self.spent, self._tasks = 0.0, SimpleQueue[_Task[Any]]()
+        self.spent, self.tasks = 0.0, SimpleQueue[_Task[Any]]()
         Thread(target=self._work, name="pendbench-second", daemon=True).start()
-
-    def do(self, task: _Task[Any]) -> None:
-        self._tasks.put(task)
 
     def _work(self) -> None:
         while True:
-            task = self._tasks.get()
+            self._do(self.tasks.get())  # and keeps nothing of it
+
+    def _do(self, task: _Task[Any]) -> None:
+        if task.take_up():
             task.call()
             self.spent = time.thread_time()
             task.end()
 
 
-@cache
-def _second() -> _Second:
-    """It is started with its first task and kept: to start one takes longer than its work."""
-    return _Second()
+class _Home:
+    """Where it is: started with its first task and kept, since to start one takes longer than its work."""
+
+    second: _Second | None
+    _starting: Lock
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """After a fork: there is none of the parent's threads, and nobody to open a lock."""
+        self.second, self._starting = None, Lock()
+
+    def do(self, task: _Task[Any]) -> None:
+        with self._starting:
+            self.second = self.second or _Second()
+        self.second.tasks.put(task)
 
 
-# A forked process has none of its parent's threads.
+_home = _Home()
+
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_second.cache_clear)
+    os.register_at_fork(after_in_child=_home.forget)
 
 
 def both(kernel: Callable[..., _Result], here: tuple[Any, ...], there: tuple[Any, ...]) -> tuple[_Result, _Result]:
-    """What the kernel returns for these arguments in this thread, and for those in the other at the same time."""
+    """What the kernel returns for these arguments in this thread, and for those in the other at the same time.
+
+    Where the other has not begun when this one is done, this one does both. Neither is left at work by an error or an
+    interrupt of the other.
+    """
     task = _Task(kernel, there)
-    _second().do(task)
     try:
+        _home.do(task)
         first = kernel(*here)
-    finally:
-        task.wait()
+        if task.take_up():
+            task.call()
+        else:
+            task.wait()
+    except BaseException:
+        if not task.take_up():
+            task.wait()
+        raise
     return first, task.result()
 
 
 def spent_beside() -> float:
     """Processor time of the second thread so far, s."""
-    return _second().spent if _second.cache_info().currsize else 0.0
+    return _home.second.spent if _home.second else 0.0

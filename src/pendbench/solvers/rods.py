@@ -40,6 +40,9 @@ EULER, BDF2, CONSERVING = 1, 2, 3
 #: What Newton's method begins with: the last turning and how it changed; or the last turning.
 CHANGING, TURNING = 0, 1
 
+#: What is no motion of a mass in a step, over the length of the chain up to it.
+_STILL = 1e-9
+
 #: Of a first step, the length squared times the largest angular acceleration, rad.
 _FIRST_TURN = 0.2
 
@@ -212,10 +215,12 @@ def miss(chain: Chain, state: State, h: float) -> float:
 def rise(chain: Chain, state: State, member: int, h: float) -> float:
     """By how much a step of `bdf2` or `implicit_euler` raises the energy.
 
-    Over the kinetic energy before it and the largest of the weights.
+    Over the kinetic energy before it, the largest of the weights, and what a motion by `_STILL` in the step has: a
+    chain at rest moves by rounding.
     """
     rows, memory, f = state.room.rows, state.memory, _formula(member, h, h / state.steps[0])
     x, y, new_x, new_y, height, reach, change, scale = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    still = 0.5 * (_STILL / h) ** 2
     for i in range(len(state.q)):
         length, mass = chain.lengths[i], 1.0 / chain.couplings[i + 1]
         new, rod, before = length * rows[ROD_X, i], memory[_ROD, i], memory[_ROD_BEFORE, i]
@@ -224,7 +229,7 @@ def rise(chain: Chain, state: State, member: int, h: float) -> float:
         y, new_y = y + memory[_SPEED + 1, i], new_y + f.new * new + f.old * rod + f.older * before
         height, reach, kinetic = height + new - rod, reach + length, 0.5 * (x * x + y * y)
         change += mass * (0.5 * (new_x * new_x + new_y * new_y) - kinetic + chain.gravity * height)
-        scale += mass * (kinetic + abs(chain.gravity) * reach)
+        scale += mass * (kinetic + abs(chain.gravity) * reach + still * reach * reach)
     return change / scale if change > 0.0 else 0.0
 
 
@@ -297,7 +302,7 @@ def accept(chain: Chain, state: State, member: int, h: float) -> None:
 
 @compiled
 def accept_calm(chain: Chain, state: State, h: float, most: float) -> bool:
-    """Go on to what closed with order 1, unless that raises the energy by more than `most` (`rise`); whether it did."""
+    """Go on to what closed with order 1, unless that raises the energy by more than `most` (`rise`): then False."""
     if most < np.inf and rise(chain, state, EULER, h) > most:
         return False
     accept(chain, state, EULER, h)

@@ -87,8 +87,8 @@ def _reach(v: FloatArray, allowed: float, relative: float, shares: FloatArray) -
 
     allowed: log2 of the tolerance over the number of the first order left out; shares: 1 / (k + 1). Each of the last
     orders limits the step by what it adds to q and by what it adds to v. And terms have to fall: close to an
-    equilibrium the last ones can be as small as you like while those that are left out are larger. A nan anywhere
-    makes it nan.
+    equilibrium the last ones can be as small as you like while those that are left out are larger. A nan in one
+    of the last orders makes it nan.
     """
     order = len(v) - 1
     most, late = -np.inf, 0.0
