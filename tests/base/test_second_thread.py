@@ -184,17 +184,21 @@ def test_an_interrupt_while_waiting_is_raised_when_the_other_is_done():
 
 @pytest.mark.usefixtures("interrupts")
 def test_an_interrupt_as_work_is_handed_over_leaves_nobody_at_work(monkeypatch):
-    done = []
+    begun, done, hand_over = threading.Event(), [], second_thread._Home.do
 
-    def put(self, task):
+    def do(self, task):
         hand_over(self, task)
-        time.sleep(0.1)
+        assert begun.wait(LONG)
         signal.raise_signal(signal.SIGINT)
 
-    hand_over = second_thread._Home.do
-    monkeypatch.setattr(second_thread._Home, "do", put)
+    def kernel():
+        begun.set()
+        time.sleep(0.3)
+        done.append(True)
+
+    monkeypatch.setattr(second_thread._Home, "do", do)
     with pytest.raises(KeyboardInterrupt):
-        both(lambda: time.sleep(0.3) or done.append(True), (), ())
+        both(kernel, (), ())
     assert done
 
 
