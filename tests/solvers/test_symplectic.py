@@ -227,12 +227,12 @@ def test_turns_are_counted(method: str) -> None:
 def test_rattle_keeps_the_rods_lengths() -> None:
     run = simulate("chain10", "analytic", "rattle", 1e-3, np.arange(0.0, 2.0, 0.1).round(3))
     assert run.status == "ok"
-    assert 0 < run.gap.max() < 1e-13
+    assert 0 < run.gap.max() < 1e-12
 
 
-@pytest.mark.parametrize("method", ["gauss4", "gauss6", "rattle"])
-def test_steps_that_do_not_converge_are_a_status(method: str) -> None:
-    scene = dataclasses.replace(load_scene("chain10"), rates=np.full(10, 50.0))
+@pytest.mark.parametrize(("method", "rate"), [("gauss4", 50.0), ("gauss6", 50.0), ("rattle", 1e5)])
+def test_steps_that_do_not_converge_are_a_status(method: str, rate: float) -> None:
+    scene = dataclasses.replace(load_scene("chain10"), rates=rate * np.arange(10))
     run = simulate(scene, "analytic", method, 0.5, [0.5, 1.0, 5.0])
     assert run.status == "not converged"
     assert "a smaller step might" in run.reason

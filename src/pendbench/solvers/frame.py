@@ -21,15 +21,15 @@ VIII.1.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from pendbench.base.arrays import FloatArray
-from pendbench.base.compiled import compiled
-from pendbench.solvers.copying import copy, copy_rows
+from pendbench.base.compiled import compiled, inlined
+from pendbench.solvers.closing import Chain
+from pendbench.solvers.copying import copy_rows
 from pendbench.solvers.methods import FixedStep, Form, add
-from pendbench.solvers.rattle import Ends, Rods, ends_at, take_steps
+from pendbench.solvers.multipliers import guess_forces, rows_of
+from pendbench.solvers.rattle import State, begin, take_steps, write_start, write_state
 
 #: A frame that asks for more steps than this is given up.
 MOST_SUBSTEPS = 4096
@@ -38,63 +38,52 @@ MOST_SUBSTEPS = 4096
 LONGEST = 0.4
 
 
-class _State(NamedTuple):
-    """What `rattle.Ends` has, and substeps (1,): in how many steps the last frame was cut."""
+@inlined
+def _frame(chain: Chain, memory: FloatArray, kept: FloatArray, steps: FloatArray, room: FloatArray, dt: float) -> bool:
+    """Take a frame of dt s in `steps[1]` steps, or in twice as many as often as it takes; else undo all.
 
-    points: FloatArray
-    speeds: FloatArray
-    forces: FloatArray
-    turns: FloatArray
-    substeps: Any
-
-
-def begin(points: FloatArray, speeds: FloatArray) -> _State:
-    """The state at the start, copied."""
-    return _State(*ends_at(points, speeds)[:4], np.ones(1, np.int64))
-
-
-@compiled
-def _copy_ends(source: Ends, target: Ends) -> None:
-    copy_rows(source.points, target.points)
-    copy_rows(source.speeds, target.speeds)
-    copy(source.forces, target.forces)
-    copy(source.turns, target.turns)
+    kept (8, n + 2): room for that.
+    """
+    copy_rows(memory, kept)
+    before = steps[0]
+    while True:
+        h, count = dt / steps[1], int(steps[1])
+        if take_steps(chain, memory, steps, room, h, count, np.inf, (LONGEST / h) ** 2) == count:
+            return True
+        copy_rows(kept, memory)
+        steps[0] = before
+        if 2.0 * steps[1] > MOST_SUBSTEPS:
+            return False
+        steps[1] *= 2.0
+        rows = rows_of(memory, room)
+        guess_forces(rows, rows.force)
 
 
 @compiled
 def _advance(
-    rods: Rods,
-    points: FloatArray,
-    speeds: FloatArray,
-    forces: FloatArray,
-    turns: FloatArray,
-    substeps: Any,
+    chain: Chain,
+    q: FloatArray,
+    v: FloatArray,
+    gap: FloatArray,
+    memory: FloatArray,
+    steps: FloatArray,
+    room: FloatArray,
     frame: float,
     frames: int,
 ) -> int:
-    """Take frames of `frame` (s) in `substeps[0]` steps each, or in twice as many as often as it takes.
-
-    Stops at the start of the first frame that would need more than MOST_SUBSTEPS steps, and returns how many it took.
-    """
-    ends = Ends(points, speeds, forces, turns, np.empty_like(points), np.empty_like(speeds))
-    kept = Ends(
-        np.empty_like(points), np.empty_like(speeds), np.empty_like(forces), np.empty_like(turns), points, speeds
-    )
-    for taken in range(frames):
-        _copy_ends(ends, kept)
-        while take_steps(rods, ends, frame / substeps[0], substeps[0], LONGEST**2) < substeps[0]:
-            for i in range(len(kept.forces)):
-                kept.forces[i] *= 0.25  # multipliers go with the square of the step
-            _copy_ends(kept, ends)
-            if 2 * substeps[0] > MOST_SUBSTEPS:
-                return taken
-            substeps[0] *= 2
-    return frames
+    state, rows, kept, taken = State(q, v, gap, memory, steps, room), rows_of(memory, room), np.empty_like(memory), 0
+    if steps[0] == 0.0:
+        write_start(chain, state, rows)
+    while taken < frames and _frame(chain, memory, kept, steps, room, frame):
+        taken += 1
+    if steps[0] > 0.0:
+        write_state(chain, state, rows)
+    return taken
 
 
-def take_frames(rods: Rods, state: _State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
+def take_frames(chain: Chain, state: State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
     """Take steps as `methods.FixedStep` says, each a frame."""
-    taken: int = _advance(rods, *state, dt, steps)
+    taken: int = _advance(chain, *state, dt, steps)
     return taken
 
 
@@ -103,7 +92,7 @@ add(
         "frame",
         order=2,
         note="RATTLE in as many equal steps as needed",
-        form=Form.ENDS,
+        form=Form.RODS,
         begin=begin,
         advance=take_frames,
         stuck=f"the chain moves too fast for {MOST_SUBSTEPS} steps in a frame",

@@ -24,8 +24,7 @@ class Form(Enum):
 
     RATES = "angles and rates"  # begin(q, v); state.q, state.v
     MOMENTA = "angles and momenta"  # begin(q, p, v); state.q, state.p
-    RODS = "the rods in the plane"  # begin(q, v); state.q, state.v, written after each call
-    ENDS = "the rods' ends in the plane"  # begin(points, speeds); state.points, state.speeds and state.turns
+    RODS = "the rods in the plane"  # begin(q, v); state.q, state.v and state.gap, written after each call
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,19 @@
 """RATTLE for a chain of points held by rods: Cartesian, symplectic, of order 2, O(n) a step.
 
-The rods' forces are found so that the rods keep their lengths after the step: Newton's method on a tridiagonal system.
-Sources: Andersen, J. Comput. Phys. 52 (1983); Hairer, Lubich, Wanner, Geometric Numerical Integration, VII.1.4.
+Rod i between its two ends is r_i, its mean velocity over the step before v_i. A step of h after one of h' is
+
+    r'_i = r_i + h v_i + k (g_i + (c_i + c_(i+1)) f_i r_i - c_(i+1) f_(i+1) r_(i+1) - c_i f_(i-1) r_(i-1))
+    v'_i = (r'_i - r_i) / h             k = h (h + h') / 2, c_(i+1) = 1/m_i, c_1 = 0, g_1 gravity, the others 0
+
+with multipliers f_i, -T_i / l_i, such that the new rods have their lengths (`multipliers`).
+The halves of the kick that RATTLE gives after one step and before the next pull along the same rods, so they are one
+here, and velocities that keep the rods' lengths are asked for at the end of a call alone.
+
+Where a whip cracks, steps are taken in halves: one that no multipliers close, and one that turns a rod far. Twice the
+step is tried again where no rod turned far by far. Each change costs a little energy, so they are rare: elsewhere the
+step is constant, and the energy has a band and no slope.
+
+Sources: Andersen, J. Comput. Phys. 52 (1983), 24; Hairer, Lubich, Wanner, Geometric Numerical Integration, VII.1.4.
 """
 
 from __future__ import annotations
@@ -11,223 +23,190 @@ from typing import NamedTuple
 import numpy as np
 
 from pendbench.base.arrays import FloatArray
-from pendbench.base.compiled import compiled, inlined
-from pendbench.solvers.copying import copy_rows
+from pendbench.base.compiled import compiled, inlined, part
+from pendbench.solvers.closing import ROD_X, ROD_Y, SPARE, TURN, Chain, write_rods
 from pendbench.solvers.methods import FixedStep, Form, add
+from pendbench.solvers.multipliers import (
+    Rows,
+    closes,
+    extrapolate_forces,
+    guess_forces,
+    quickness,
+    rows_of,
+    turns_within,
+)
+from pendbench.solvers.projection import across, solve_rods
 
-_MOST_ITERATIONS = 50
-_CLOSE = 1e-10  # the worst relative error of a rod's squared length that passes; a chain of n rounds it to n 1e-15
+#: A step is cut into so many parts at most.
+FINEST = 1024
 
-
-class Rods(NamedTuple):
-    """masses (n,) kg, lengths (n,) m, gravity m/s^2, scratch (rows, n). One thread, one system."""
-
-    masses: FloatArray
-    lengths: FloatArray
-    gravity: float
-    scratch: FloatArray
-
-
-class _Rows(NamedTuple):
-    """The rows of the scratch: the rods before and after the step, and the tridiagonal system."""
-
-    old_x: FloatArray
-    old_y: FloatArray
-    new_x: FloatArray
-    new_y: FloatArray
-    below: FloatArray
-    diagonal: FloatArray
-    above: FloatArray
-    right: FloatArray
+_FAR, _CALM = 0.5, 0.07  # rad: a step that turns a rod further is cut; after one that turns none so far, twice is tried
 
 
-def rods_of(masses: FloatArray, lengths: FloatArray, gravity: float) -> Rods:
-    """A chain of rods, copied, with room to work in."""
-    return Rods(masses.copy(), lengths.copy(), float(gravity), np.empty((len(_Rows._fields), len(masses))))
+class State(NamedTuple):
+    """What is kept from step to step.
 
-
-class Ends(NamedTuple):
-    """The rods' ends.
-
-    points (n, 2) m and speeds (n, 2) m/s; forces (n,): the rods' multipliers of the step before, to begin Newton's
-    method with; turns (n,): how often each rod went over the top, counter-clockwise positive. new_points, new_speeds
-    (n, 2): those of the step that is being tried.
+    q, v (n,): angles and rates after the last call. gap (1,): how far the worst rod was from its length then, relative
+    to it. memory (8, n + 2): the rows of `Rows` that are kept. steps (2,): the length of the last step, s, 0 before the
+    first, and into how many parts steps are cut. room (12, n + 2): where steps are computed.
     """
 
-    points: FloatArray
-    speeds: FloatArray
-    forces: FloatArray
-    turns: FloatArray
-    new_points: FloatArray
-    new_speeds: FloatArray
+    q: FloatArray
+    v: FloatArray
+    gap: FloatArray
+    memory: FloatArray
+    steps: FloatArray
+    room: FloatArray
 
 
-def ends_at(points: FloatArray, speeds: FloatArray) -> Ends:
-    """The rods' ends at the start, copied."""
-    n = len(points)
-    return Ends(points.copy(), speeds.copy(), np.zeros(n), np.zeros(n), np.empty_like(points), np.empty_like(speeds))
+def begin(q: FloatArray, v: FloatArray) -> State:
+    """The state at the start, copied."""
+    n = len(q)
+    return State(q.copy(), v.copy(), np.zeros(1), np.zeros((8, n + 2)), np.array([0.0, 1.0]), np.zeros((12, n + 2)))
 
 
 @inlined
-def _solve(rows: _Rows) -> None:
-    """Solve the tridiagonal system in place, the answer in its right side.
+def write_start(chain: Chain, state: State, rows: Rows) -> None:
+    """The rods, their speeds and turns, of the angles and rates."""
+    room, lengths = state.room, chain.lengths
+    write_rods(state.q, room, ROD_Y)
+    for i in range(len(lengths)):
+        x, y, rate = lengths[i] * room[ROD_X, i], lengths[i] * room[ROD_Y, i], state.v[i]
+        rows.x[i + 1], rows.y[i + 1], rows.speed_x[i], rows.speed_y[i] = x, y, -rate * y, rate * x
+        rows.turns[i] = np.round((state.q[i] - np.arctan2(x, -y)) / TURN)
 
-    Keeps the pivots' reciprocals, so that on the way back nothing waits for a division.
+
+@inlined
+def _accept(rows: Rows, h: float) -> None:
+    """Go on from the new rods. One above the pivot whose x changes sign went over the top."""
+    x, y, new_x, new_y, rate = rows.x, rows.y, rows.new_x, rows.new_y, 1.0 / h
+    for i in range(len(new_x)):
+        right, still = x[i + 1] >= 0.0, new_x[i] >= 0.0
+        over = (1.0 if right else 0.0) - (1.0 if still else 0.0)
+        rows.turns[i] += over if new_y[i] > 0.0 else 0.0
+        rows.speed_x[i], rows.speed_y[i] = rate * (new_x[i] - x[i + 1]), rate * (new_y[i] - y[i + 1])
+        x[i + 1], y[i + 1] = new_x[i], new_y[i]
+
+
+@part
+def take_steps(
+    chain: Chain,
+    memory: FloatArray,
+    steps: FloatArray,
+    room: FloatArray,
+    h: float,
+    count: int,
+    furthest: float,
+    quickest: float,
+) -> int:
+    """Take up to `count` steps of h s, and return how many were taken.
+
+    Stops at the start of the first that no multipliers close, or that turns a rod by more than `furthest`, rad; and
+    after the first whose multipliers have a `quickness` above `quickest`, which does not count. In a kernel of its own,
+    since next to copies its loops do not run in vector registers.
     """
-    below, diagonal, above, right = rows.below, rows.diagonal, rows.above, rows.right
-    n = len(diagonal)
-    diagonal[0] = 1.0 / diagonal[0]
-    for i in range(1, n):
-        ratio = below[i] * diagonal[i - 1]
-        diagonal[i] = 1.0 / (diagonal[i] - ratio * above[i - 1])
-        right[i] -= ratio * right[i - 1]
-    right[n - 1] *= diagonal[n - 1]
-    for i in range(n - 2, -1, -1):
-        right[i] = (right[i] - above[i] * right[i + 1]) * diagonal[i]
+    rows = rows_of(memory, room)
+    for i in range(len(rows.off)):
+        rows.inverse_square[i] = 1.0 / (chain.lengths[i] * chain.lengths[i])
+    for step in range(count):
+        between, falling = 0.5 * (h + steps[0]), rows.speed_y[0]
+        rows.speed_y[0] -= between * chain.gravity
+        extrapolate_forces(rows)
+        if not closes(chain, rows, h, h * between) or (furthest < np.inf and not turns_within(rows, furthest)):
+            rows.speed_y[0] = falling
+            guess_forces(rows, rows.force_before)
+            return step
+        _accept(rows, h)
+        steps[0] = h
+        if quickest < np.inf and not quickness(chain.couplings, rows.force) <= quickest:
+            return step
+    return count
 
 
 @inlined
-def _push(masses: FloatArray, along_x: FloatArray, along_y: FloatArray, force: FloatArray, out: FloatArray) -> None:
-    """Add to the points' `out` (n, 2) what forces in the rods, each along its (x, y), do to them over their masses."""
-    outer_x, outer_y = 0.0, 0.0
-    for i in range(len(masses) - 1, -1, -1):
-        inverse = 1.0 / masses[i]
-        x = force[i] * along_x[i]
-        y = force[i] * along_y[i]
-        out[i, 0] += (x - outer_x) * inverse
-        out[i, 1] += (y - outer_y) * inverse
-        outer_x, outer_y = x, y
+def _is_calm(chain: Chain, rows: Rows, h: float) -> bool:
+    """Whether no rod turned by more than `_CALM` in the last step of h s; of its turn, the chord is asked."""
+    beyond = 0
+    for i in range(len(rows.off)):
+        beyond += not h * np.hypot(rows.speed_x[i], rows.speed_y[i]) <= _CALM * chain.lengths[i]
+    return beyond == 0
 
 
 @inlined
-def _write_rods(points: FloatArray, x: FloatArray, y: FloatArray) -> None:
-    """Write the rods (x, y) between `points` (n, 2), the first from the origin."""
-    x[0], y[0] = points[0, 0], points[0, 1]
-    for i in range(1, len(x)):
-        x[i] = points[i, 0] - points[i - 1, 0]
-        y[i] = points[i, 1] - points[i - 1, 1]
+def _in_parts(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatArray, rows: Rows, dt: float) -> bool:
+    """Take a step of dt s in as many parts as it asks for; False where even the finest do not close."""
+    left = 1.0
+    while left > 0.0:
+        parts = steps[1]
+        h, furthest = dt / parts, _FAR if parts < FINEST else np.inf
+        if take_steps(chain, memory, steps, room, h, 1, furthest, np.inf) == 1:
+            left -= 1.0 / parts
+            if (left * parts) % 2.0 == 0.0 and _is_calm(chain, rows, h):
+                steps[1] *= 0.5
+                guess_forces(rows, rows.force)
+        elif parts < FINEST:
+            steps[1] *= 2.0
+        else:
+            return False
+    return True
 
 
 @inlined
-def _write_matrix(masses: FloatArray, rows: _Rows, x: FloatArray, y: FloatArray) -> None:
-    """The matrix of how forces along rods (x, y) change the rods' ends, projected on the new rods."""
-    along_x, along_y, below, diagonal, above = rows.new_x, rows.new_y, rows.below, rows.diagonal, rows.above
-    for i in range(len(masses)):
-        inverse = 1.0 / masses[i]
-        before = 1.0 / masses[i - 1] if i > 0 else 0.0
-        diagonal[i] = (inverse + before) * (along_x[i] * x[i] + along_y[i] * y[i])
-        below[i] = -before * (along_x[i] * x[i - 1] + along_y[i] * y[i - 1]) if i > 0 else 0.0
-        above[i] = -inverse * (along_x[i] * x[i + 1] + along_y[i] * y[i + 1]) if i + 1 < len(masses) else 0.0
-
-
-@inlined
-def _count_turns(rows: _Rows, turns: FloatArray) -> None:
-    """A rod above the pivot whose x changes sign went over the top (with less than a quarter turn a step)."""
-    old_x, new_x, new_y = rows.old_x, rows.new_x, rows.new_y
-    for i in range(len(turns)):
-        if new_y[i] > 0.0:
-            if old_x[i] >= 0.0 > new_x[i]:
-                turns[i] += 1.0
-            elif old_x[i] < 0.0 <= new_x[i]:
-                turns[i] -= 1.0
-
-
-@inlined
-def _place(rods: Rods, rows: _Rows, h: float, ends: Ends) -> bool:
-    """Find the points after a step of h, and the rods' multipliers; False if there are none.
-
-    Leaves the old rods and the new ones in the rows.
-    """
-    lengths, n, points, speeds, out = rods.lengths, len(rods.lengths), ends.points, ends.speeds, ends.new_points
-    new_x, new_y, right = rows.new_x, rows.new_y, rows.right
-    _write_rods(points, rows.old_x, rows.old_y)
-    worst, before = np.inf, np.inf
-    for _ in range(_MOST_ITERATIONS):
-        for i in range(n):
-            out[i, 0] = points[i, 0] + h * speeds[i, 0]
-            out[i, 1] = points[i, 1] + h * speeds[i, 1] - 0.5 * h * h * rods.gravity
-        _push(rods.masses, rows.old_x, rows.old_y, ends.forces, out)
-        _write_rods(out, new_x, new_y)
-        before, worst = worst, 0.0
-        for i in range(n):
-            excess = new_x[i] * new_x[i] + new_y[i] * new_y[i] - lengths[i] * lengths[i]
-            worst = max(worst, abs(excess) / (lengths[i] * lengths[i]))
-            right[i] = -0.5 * excess
-        if not np.isfinite(worst) or worst < 4e-16 or 0.5 * before <= worst < _CLOSE:
-            break
-        _write_matrix(rods.masses, rows, rows.old_x, rows.old_y)
-        _solve(rows)
-        for i in range(n):
-            ends.forces[i] += right[i]
-    return worst < _CLOSE
-
-
-@inlined
-def _write_speeds(rods: Rods, rows: _Rows, h: float, ends: Ends) -> None:
-    """The speeds after a step to the new points, less what stretches the rods: that is linear in the forces."""
-    speeds, right, x, y = ends.new_speeds, rows.right, rows.new_x, rows.new_y
-    for i in range(len(x)):
-        speeds[i, 0] = (ends.new_points[i, 0] - ends.points[i, 0]) / h
-        speeds[i, 1] = (ends.new_points[i, 1] - ends.points[i, 1]) / h - 0.5 * h * rods.gravity
-    _write_matrix(rods.masses, rows, x, y)
-    for i in range(len(x)):
-        relative_x = speeds[i, 0] - (speeds[i - 1, 0] if i > 0 else 0.0)
-        relative_y = speeds[i, 1] - (speeds[i - 1, 1] if i > 0 else 0.0)
-        right[i] = -(x[i] * relative_x + y[i] * relative_y)
-    _solve(rows)
-    _push(rods.masses, x, y, right, speeds)
-
-
-@inlined
-def quickness(masses: FloatArray, forces: FloatArray) -> float:
-    """(h W)^2 of the step whose multipliers were forces (n,), -h^2 T / (2 l) kg; nan where one of them is.
-
-    masses (n,) kg; W is the bound on the chain's frequencies that `frame` explains.
-    """
-    most, n = 0.0, len(masses)
+def write_state(chain: Chain, state: State, rows: Rows) -> None:
+    """The angles, the rates that the rods' lengths allow, and the gap."""
+    s, n, lengths = state.room, len(state.q), chain.lengths
+    state.gap[0] = 0.0
     for i in range(n):
-        outer = abs(forces[i + 1]) if i + 1 < n else 0.0
-        squared = 4.0 * (abs(forces[i]) + outer) / masses[i]
-        if not squared <= most:  # so that nan counts
-            most = squared
-    return most
-
-
-def _steps(rods: Rods, ends: Ends, h: float, steps: int, quickest: float) -> int:
-    """Take steps of h (s), and return how many were taken.
-
-    Stops at the first step whose rods cannot be brought to their lengths, or whose `quickness` is above `quickest`.
-    """
-    s = rods.scratch
-    rows = _Rows(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7])
-    for step in range(steps):
-        if not _place(rods, rows, h, ends):
-            return step
-        if quickest < np.inf and not quickness(rods.masses, ends.forces) <= quickest:
-            return step
-        _write_speeds(rods, rows, h, ends)
-        _count_turns(rows, ends.turns)
-        copy_rows(ends.new_points, ends.points)
-        copy_rows(ends.new_speeds, ends.speeds)
-    return steps
-
-
-#: Measured at two links: made part of `_rattle` the steps take a fifth longer, and made part of `frame` a fifth less.
-_kernel = compiled(_steps)
-take_steps = inlined(_steps)
+        x, y = rows.x[i + 1], rows.y[i + 1]
+        state.q[i] = np.arctan2(x, -y) + TURN * rows.turns[i]
+        state.gap[0] = max(state.gap[0], abs(np.hypot(x, y) / lengths[i] - 1.0))
+    between = rows.speed_y[0]
+    rows.speed_y[0] -= 0.5 * state.steps[0] * chain.gravity
+    for i in range(n):
+        s[ROD_X, i], s[ROD_Y, i] = rows.x[i + 1] / lengths[i], rows.y[i + 1] / lengths[i]
+        s[SPARE, i] = s[ROD_X, i] * rows.speed_x[i] + s[ROD_Y, i] * rows.speed_y[i]
+    solve_rods(chain, s, n)
+    for i in range(n):
+        state.v[i] = across(chain, s, i, rows.speed_x[i], rows.speed_y[i])
+    rows.speed_y[0] = between
 
 
 @compiled
 def _rattle(
-    rods: Rods, points: FloatArray, speeds: FloatArray, forces: FloatArray, turns: FloatArray, dt: float, steps: int
+    chain: Chain,
+    q: FloatArray,
+    v: FloatArray,
+    gap: FloatArray,
+    memory: FloatArray,
+    steps: FloatArray,
+    room: FloatArray,
+    dt: float,
+    count: int,
 ) -> int:
-    ends = Ends(points, speeds, forces, turns, np.empty_like(points), np.empty_like(speeds))
-    return _kernel(rods, ends, dt, steps, np.inf)
+    """Take steps of dt s, and return how many; where not all could be taken, what is left is of no use."""
+    state, rows, taken = State(q, v, gap, memory, steps, room), rows_of(memory, room), 0
+    if steps[0] == 0.0:
+        write_start(chain, state, rows)
+    while taken < count:
+        if steps[1] == 1.0:
+            taken += take_steps(chain, memory, steps, room, dt, count - taken, _FAR, np.inf)
+        if taken < count:
+            steps[1] = max(steps[1], 2.0)
+            if not _in_parts(chain, memory, steps, room, rows, dt):
+                return taken
+            taken += 1
+    if steps[0] > 0.0:
+        write_state(chain, state, rows)
+    return taken
 
 
-def rattle(rods: Rods, ends: Ends, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
+def rattle(chain: Chain, state: State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
     """Take steps as `methods.FixedStep` says. A group costs Python a microsecond and more, so it passes arrays."""
-    taken: int = _rattle(rods, *ends[:4], dt, steps)
+    memory, lengths = state.memory.copy(), state.steps.copy()
+    taken: int = _rattle(chain, *state, dt, steps)
+    if taken < steps:  # to the start of the one that could not be
+        state.memory[:], state.steps[:] = memory, lengths
+        _rattle(chain, *state, dt, taken)
     return taken
 
 
@@ -236,10 +215,11 @@ add(
         "rattle",
         order=2,
         note="constrained Cartesian Stormer-Verlet: symplectic, for large n",
-        form=Form.ENDS,
-        begin=ends_at,
+        form=Form.RODS,
+        begin=begin,
         advance=rattle,
-        stuck="no forces keep the rods at their lengths",
+        stuck=f"no forces keep the rods at their lengths, not even in {FINEST} parts of the step",
         remedy="a smaller step might",
+        substeps=True,
     )
 )

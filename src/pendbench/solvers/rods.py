@@ -53,14 +53,16 @@ _ROD, _SPEED, _ROD_BEFORE, _SPEED_BEFORE, _TURNED, _TURNED_BEFORE, _TENSION, _TE
 class State(NamedTuple):
     """What is kept from step to step.
 
-    q, v (n,): angles and rates after the last step. memory (12, n): the rods (x, y), m, their speeds (x, y), m/s, and
-    both before the last step; the mean rates of the last two steps, rad/s; tensions, N, and how they changed, N/s.
+    q, v (n,): angles and rates after the last step. gap (1,): 0, for rods are those of angles. memory (12, n): the
+    rods (x, y), m, their speeds (x, y), m/s, and both before the last step; the mean rates of the last two steps,
+    rad/s; tensions, N, and how they changed, N/s.
     steps (4,): the length of the last two, s; the part of a step, of `FINEST`, to try next, 0 before the first; and how
     many more steps are to be of order 1. room: where steps are computed.
     """
 
     q: FloatArray
     v: FloatArray
+    gap: FloatArray
     memory: FloatArray
     steps: FloatArray
     room: Room
@@ -85,7 +87,7 @@ class _Formula(NamedTuple):
 
 def begin(q: FloatArray, v: FloatArray) -> State:
     """The state at the start, copied."""
-    return State(q.copy(), v.copy(), np.zeros((12, len(q))), np.zeros(4), room_for(len(q)))
+    return State(q.copy(), v.copy(), np.zeros(1), np.zeros((12, len(q))), np.zeros(4), room_for(len(q)))
 
 
 @inlined

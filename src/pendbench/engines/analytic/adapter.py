@@ -34,7 +34,7 @@ def _described(method: FixedStep) -> Method:
         note=method.note,
         settings=threads,
         substeps=method.substeps,
-        effects=_GRAVITY if method.form in (Form.ENDS, Form.RODS) else None,
+        effects=_GRAVITY if method.form is Form.RODS else None,
         conserves=method.conserves,
     )
 

@@ -7,11 +7,9 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from pendbench.base.arrays import FloatArray
 from pendbench.base.faults import Fault
 from pendbench.engines.protocol import State, not_finite
 from pendbench.physics.acting import check_plain
-from pendbench.physics.geometry import positions, rod_vectors, velocities
 from pendbench.physics.kernels.system import RotorSystem
 from pendbench.physics.kernels.table import momenta_of, rates_of, series_system_of, system_of
 from pendbench.scene.scene import Scene
@@ -20,7 +18,6 @@ from pendbench.solvers.closing import chain_of
 from pendbench.solvers.compensated import sum_from
 from pendbench.solvers.dop853 import DOP853
 from pendbench.solvers.methods import FixedStep, Form
-from pendbench.solvers.rattle import rods_of
 
 
 def _given_up(how: int, t: float) -> Fault | None:
@@ -71,33 +68,7 @@ class _Rods:
         self.state = method.begin(scene.angles, scene.rates)
 
     def now(self, taken: int) -> State:  # noqa: ARG002
-        return State(self.state.q.copy(), self.state.v.copy(), 0.0)
-
-
-class _Ends:
-    """The rods' ends in the plane, and what they say of angles and rates."""
-
-    def __init__(self, scene: Scene, method: FixedStep) -> None:
-        check_plain(scene, "RATTLE")
-        self.system = rods_of(scene.masses, scene.lengths, scene.effects.gravity or 0.0)
-        points = positions(scene.lengths, scene.angles)
-        self.state = method.begin(points, velocities(scene.lengths, scene.angles, scene.rates))
-        self._start = State(scene.angles.copy(), scene.rates.copy())
-        self.state.turns[:] = np.round((scene.angles - self._directions()) / (2 * np.pi))
-
-    def _directions(self) -> FloatArray:
-        rods = rod_vectors(self.state.points)
-        return np.arctan2(rods[:, 0], -rods[:, 1])
-
-    def now(self, taken: int) -> State:
-        """Also how far the worst rod is from its length."""
-        if taken == 0:
-            return State(self._start.theta.copy(), self._start.omega.copy())
-        theta = self._directions() + 2 * np.pi * self.state.turns
-        relative = rod_vectors(self.state.speeds)
-        omega = (np.cos(theta) * relative[:, 0] + np.sin(theta) * relative[:, 1]) / self.system.lengths
-        gap = np.abs(np.hypot(*rod_vectors(self.state.points).T) / self.system.lengths - 1).max()
-        return State(theta, omega, float(gap))
+        return State(self.state.q.copy(), self.state.v.copy(), float(self.state.gap[0]))
 
 
 class _Variables(Protocol):
@@ -113,7 +84,6 @@ _VARIABLES: Final[Mapping[Form, Callable[[Scene, FixedStep], _Variables]]] = {
     Form.RATES: _Rates,
     Form.MOMENTA: _Momenta,
     Form.RODS: _Rods,
-    Form.ENDS: _Ends,
 }
 
 

@@ -1,0 +1,209 @@
+"""Multipliers that keep rods whole: the forces in the rods of a chain over a step of RATTLE, in O(n) an iteration.
+
+The new rods are linear in the multipliers, their squared lengths quadratic: Newton's method on a tridiagonal system,
+that of `rattle`. Its unknowns change little from one step to the next, so the parabola through the last three begins
+within an iteration or two.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import inlined
+from pendbench.solvers.closing import Chain
+
+_MOST_ITERATIONS = 12
+_CLOSE = 1e-12  # how far a rod may be from its length, relative to it
+_ROUGH = 1e-3  # from where on the matrix of one iteration will not do for the next
+_SMALL, _LARGE = 1e-20, 1e20  # between these, determinants need not be reduced
+_LINKS_BETWEEN = 4  # two looks at that: so many links multiply them by 1e200 at most, since masses end at 1e50
+
+
+class Rows(NamedTuple):
+    """The rods, m, and their multipliers now and in the two steps before, N/m, (n + 2,) from place 1 on; their speeds,
+    m/s, and how often each went over the top, counter-clockwise positive, (n,).
+
+    In the room, (n,): the new rods, m; 1 / l^2; how far new rods are from their lengths, over l; and the matrix of the
+    changes of that, eliminated: what neighbours add to a multiplier, what a right side is multiplied by, determinants.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    force: FloatArray
+    force_before: FloatArray
+    force_older: FloatArray
+    speed_x: FloatArray
+    speed_y: FloatArray
+    turns: FloatArray
+    new_x: FloatArray
+    new_y: FloatArray
+    inverse_square: FloatArray
+    off: FloatArray
+    below: FloatArray
+    above: FloatArray
+    share: FloatArray
+    determinant: FloatArray
+
+
+@inlined
+def rows_of(memory: FloatArray, room: FloatArray) -> Rows:
+    """The rows by their names."""
+    m, s, n = memory, room, memory.shape[1] - 2
+    moving, new = (m[5, :n], m[6, :n], m[7, :n]), (s[0, :n], s[1, :n], s[2, :n], s[3, :n])
+    return Rows(m[0], m[1], m[2], m[3], m[4], *moving, *new, s[4, :n], s[5, :n], s[6, :n], s[7, :n])
+
+
+@inlined
+def guess_forces(rows: Rows, last: FloatArray) -> None:
+    """Begin from the last multipliers (n + 2,) alone: those before were found with other steps."""
+    for i in range(len(last)):
+        guess = last[i]
+        rows.force[i], rows.force_before[i], rows.force_older[i] = guess, guess, guess
+
+
+@inlined
+def extrapolate_forces(rows: Rows) -> None:
+    """The next multipliers, by the parabola through the last three."""
+    force, before, older = rows.force, rows.force_before, rows.force_older
+    for i in range(len(force)):
+        extrapolated = 3.0 * (force[i] - before[i]) + older[i]
+        older[i], before[i], force[i] = before[i], force[i], extrapolated
+
+
+@inlined
+def _write_new_rods(chain: Chain, rows: Rows, h: float, kick: float) -> tuple[int, int]:
+    """The rods after a step of h s, with k of `kick`, s^2; how many are not of their lengths, and how many are far off.
+
+    Counted, since a loop that looks for the largest does not run in vector registers.
+    """
+    couplings, x, y, force, off = chain.couplings, rows.x, rows.y, rows.force, rows.off
+    open_rods, rough = 0, 0
+    for i in range(len(off)):
+        inner, outer = kick * couplings[i], kick * couplings[i + 1]
+        own, out, back = (inner + outer) * force[i + 1], outer * force[i + 2], inner * force[i]
+        new_x = x[i + 1] + h * rows.speed_x[i] + own * x[i + 1] - out * x[i + 2] - back * x[i]
+        new_y = y[i + 1] + h * rows.speed_y[i] + own * y[i + 1] - out * y[i + 2] - back * y[i]
+        rows.new_x[i], rows.new_y[i] = new_x, new_y
+        off[i] = 0.5 - 0.5 * rows.inverse_square[i] * (new_x * new_x + new_y * new_y)
+        open_rods += not abs(off[i]) <= _CLOSE
+        rough += not abs(off[i]) <= _ROUGH
+    return open_rods, rough
+
+
+@inlined
+def _write_matrix(chain: Chain, rows: Rows, kick: float) -> None:
+    """How multipliers change the squares of the new rods, over 2 l^2: own ones, those below and those above."""
+    couplings, x, y = chain.couplings, rows.x, rows.y
+    for i in range(len(rows.off)):
+        scale, inner, outer = kick * rows.inverse_square[i], couplings[i], couplings[i + 1]
+        new_x, new_y = scale * rows.new_x[i], scale * rows.new_y[i]
+        rows.determinant[i] = (inner + outer) * (new_x * x[i + 1] + new_y * y[i + 1])
+        rows.below[i] = inner * (new_x * x[i] + new_y * y[i])
+        rows.above[i] = outer * (new_x * x[i + 2] + new_y * y[i + 2])
+
+
+@inlined
+def _reduced(determinant: float, before: float) -> tuple[float, float]:
+    """A determinant and the one before, over one where they have become large or small."""
+    share = 1.0 if _SMALL < abs(determinant) < _LARGE else 1.0 / determinant
+    return determinant * share, before * share
+
+
+@inlined
+def _eliminate(rows: Rows) -> None:
+    """Eliminate the matrix from both ends to the middle: while one waits for a product, the other goes on.
+
+    By determinants of its corners, so that divisions come at the end, where none waits for another.
+    """
+    below, above, share, determinant = rows.below, rows.above, rows.share, rows.determinant
+    n = len(below)
+    middle, extra = n // 2, 1 - n % 2  # of an even number the inner side has one more
+    inner, inner_before, passed = 1.0, 0.0, 0.0
+    outer, outer_before, passed_back = 1.0, 0.0, 0.0
+    for i in range(extra):
+        share[i], inner_before, inner, passed = 1.0, 1.0, determinant[i], above[i]
+    for start in range(0, middle - extra, _LINKS_BETWEEN):
+        for k in range(start, min(start + _LINKS_BETWEEN, middle - extra)):
+            i, j = extra + k, n - 1 - k
+            share[i], share[j] = inner, outer
+            inner, inner_before = determinant[i] * inner - below[i] * passed * inner_before, inner
+            outer, outer_before = determinant[j] * outer - above[j] * passed_back * outer_before, outer
+            determinant[i], determinant[j], passed, passed_back = inner, outer, above[i], below[j]
+        inner, inner_before = _reduced(inner, inner_before)
+        outer, outer_before = _reduced(outer, outer_before)
+    share[middle] = inner * outer
+    pulled, pulled_back = below[middle] * passed * inner_before, above[middle] * passed_back * outer_before
+    determinant[middle] = determinant[middle] * inner * outer - pulled * outer - pulled_back * inner
+    for i in range(n):
+        share[i] /= determinant[i]
+        below[i] *= share[i]
+        above[i] *= share[i]
+
+
+@inlined
+def _correct(rows: Rows) -> None:
+    """Change the multipliers so that, to first order, the new rods get their lengths."""
+    force, off, below, above = rows.force, rows.off, rows.below, rows.above
+    n = len(off)
+    middle, extra = n // 2, 1 - n % 2
+    for i in range(n):
+        off[i] *= rows.share[i]
+    inner, outer = off[0] if extra == 1 else 0.0, 0.0
+    for k in range(middle - extra):
+        i, j = extra + k, n - 1 - k
+        inner, outer = off[i] + below[i] * inner, off[j] + above[j] * outer
+        off[i], off[j] = inner, outer
+    inner = off[middle] + below[middle] * inner + above[middle] * outer
+    force[middle + 1] += inner
+    outer = inner
+    for k in range(middle - extra):
+        i, j = middle - 1 - k, middle + 1 + k
+        inner, outer = off[i] + above[i] * inner, off[j] + below[j] * outer
+        force[i + 1] += inner
+        force[j + 1] += outer
+    for i in range(extra):
+        force[i + 1] += off[i] + above[i] * inner
+
+
+@inlined
+def closes(chain: Chain, rows: Rows, h: float, kick: float) -> bool:
+    """Whether multipliers are found that close a step of h s; leaves the new rods.
+
+    Where no rod is far off, the matrix changes little from one iteration to the next and is not eliminated again.
+    """
+    again = True
+    for _ in range(_MOST_ITERATIONS):
+        open_rods, rough = _write_new_rods(chain, rows, h, kick)
+        if open_rods == 0:
+            return True
+        if again:
+            _write_matrix(chain, rows, kick)
+            _eliminate(rows)
+            again = rough > 0
+        _correct(rows)
+    return False
+
+
+@inlined
+def turns_within(rows: Rows, most: float) -> bool:
+    """Whether no rod turns by more than `most`, rad, to the new ones; of its turn, the chord is asked."""
+    beyond = 0
+    for i in range(len(rows.off)):
+        x, y = rows.new_x[i] - rows.x[i + 1], rows.new_y[i] - rows.y[i + 1]
+        beyond += not rows.inverse_square[i] * (x * x + y * y) <= most * most
+    return beyond == 0
+
+
+@inlined
+def quickness(couplings: FloatArray, forces: FloatArray) -> float:
+    """W^2, 1/s^2, of multipliers -T / l, N/m; nan where one of them is. W is the bound that `frame` explains.
+
+    couplings (n + 1,) as in `Chain`; forces (n + 2,), from place 1 on.
+    """
+    most = 0.0
+    for i in range(1, len(couplings)):
+        squared = 2.0 * (abs(forces[i]) + abs(forces[i + 1])) * couplings[i]
+        if not squared <= most:  # so that nan counts
+            most = squared
+    return most
