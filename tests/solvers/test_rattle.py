@@ -1,0 +1,128 @@
+"""RATTLE against one that is written out with dense matrices, and where it cuts its steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pendbench.base.arrays import FloatArray
+from pendbench.physics.energy import energy, energy_scale
+from pendbench.physics.geometry import positions, rod_vectors, velocities
+from pendbench.scene.scene import Scene
+from pendbench.solvers.closing import chain_of
+from pendbench.solvers.rattle import State, begin, rattle
+from support.scenes import chain, random_chain
+
+
+class Run:
+    """A scene at its start, and what becomes of it."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.chain = chain_of(scene.masses, scene.lengths, scene.effects.gravity or 0.0)
+        self.state: State = begin(scene.angles, scene.rates)
+
+    def steps(self, h: float, count: int) -> int:
+        return rattle(self.chain, self.state, 0, h, count)
+
+    @property
+    def strays(self) -> float:
+        """The error in energy, in its scale."""
+        scene, state = self.scene, self.state
+        found = energy(scene, state.q, state.v) - energy(scene, scene.angles, scene.rates)
+        return float(abs(found) / energy_scale(scene))
+
+
+def dense_rattle(scene: Scene, h: float, count: int) -> tuple[FloatArray, FloatArray]:
+    """Points (n, 2) and their velocities after steps of h s: Andersen's two stages, each with a dense matrix."""
+    n, inverse = scene.n, np.repeat(1.0 / scene.masses, 2)
+    differences = np.kron(np.eye(n) - np.eye(n, k=-1), np.eye(2))  # rods of points
+    x = positions(scene.lengths, scene.angles).ravel()
+    v = velocities(scene.lengths, scene.angles, scene.rates).ravel()
+    fall = np.tile([0.0, -(scene.effects.gravity or 0.0)], n)
+
+    def pulls(points: FloatArray) -> FloatArray:
+        rods = (differences @ points).reshape(n, 2)
+        return differences.T @ np.einsum("ij,ik->ijk", np.eye(n), rods).reshape(n, 2 * n).T
+
+    for _ in range(count):
+        along, half = pulls(x), v + 0.5 * h * fall
+        multipliers = np.zeros(n)
+        for _ in range(50):
+            new = x + h * (half + inverse * (along @ multipliers))
+            off = ((differences @ new).reshape(n, 2) ** 2).sum(axis=1) - scene.lengths**2
+            multipliers -= np.linalg.solve(2.0 * h * pulls(new).T @ (inverse[:, None] * along), off)
+        v = half + inverse * (along @ multipliers) + 0.5 * h * fall
+        along = pulls(new)
+        stretching = along.T @ v
+        v = v - inverse * (along @ np.linalg.solve(along.T @ (inverse[:, None] * along), stretching))
+        x = new
+    return x.reshape(n, 2), v.reshape(n, 2)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8, 13])
+def test_it_is_rattle(n: int) -> None:
+    scene, h, count = random_chain(n, seed=n), 5e-4, 100
+    run = Run(scene)
+    assert run.steps(h, count) == count
+    assert run.state.steps[1] == 1.0
+    points, speeds = dense_rattle(scene, h, count)
+    rods = rod_vectors(points)
+    assert np.sin(run.state.q) == pytest.approx(rods[:, 0] / scene.lengths, abs=1e-9)
+    assert -np.cos(run.state.q) == pytest.approx(rods[:, 1] / scene.lengths, abs=1e-9)
+    found = velocities(scene.lengths, run.state.q, run.state.v)
+    assert found == pytest.approx(speeds, abs=1e-8 * np.abs(speeds).max())
+
+
+def test_masses_over_eight_decades_close() -> None:
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        scene = random_chain(12, seed=seed)
+        scene = chain(12, mass=list(10.0 ** rng.uniform(-4, 4, 12)), angle=list(scene.angles))
+        run = Run(scene)
+        assert run.steps(1e-5, 200) == 200
+        assert run.state.gap[0] < 1e-12
+        assert run.strays < 1e-6
+
+
+def test_steps_are_the_same_however_they_are_asked_for() -> None:
+    scene = random_chain(6, seed=3)
+    once, singly = Run(scene), Run(scene)
+    assert once.steps(2e-3, 300) == 300
+    assert all(singly.steps(2e-3, 1) == 1 for _ in range(300))
+    np.testing.assert_array_equal(once.state.q, singly.state.q)
+    np.testing.assert_array_equal(once.state.v, singly.state.v)
+
+
+def test_a_whip_s_crack_is_taken_in_parts_and_nothing_else() -> None:
+    """A rope of 200 links released horizontally cracks first at 1.4 s; uncut, it does not close at this step."""
+    run, parts = Run(chain(200, mass=1 / 200)), []
+    for _ in range(800):
+        assert run.steps(1.25e-4, 20) == 20
+        parts.append(run.state.steps[1])
+    assert max(parts[:500]) == 1.0
+    assert max(parts) > 1.0
+    assert parts.count(1.0) > 700
+    assert run.strays < 0.005
+
+
+def test_a_cut_step_is_its_parts() -> None:
+    """A pendulum that turns by 0.9 rad in a step: two parts of 0.45, and never again a whole step."""
+    scene = chain(1, length=1.0, rate=9.0, gravity=None)
+    cut, parts = Run(scene), Run(scene)
+    assert cut.steps(0.1, 40) == 40
+    assert cut.state.steps[1] == 2.0
+    assert parts.steps(0.05, 80) == 80
+    np.testing.assert_array_equal(cut.state.q, parts.state.q)
+    assert cut.state.q[0] > 10 * np.pi
+
+
+def test_what_cannot_be_taken_leaves_the_step_before() -> None:
+    """Rods that are spun faster and faster: from some rate on, not even 1024 parts of a step close."""
+    scene = chain(4, length=1.0, rate=[1e3, -2e3, 4e3, -3e3], gravity=None)
+    run = Run(scene)
+    assert run.steps(1e-3, 3) == 3
+    kept = [array.copy() for array in run.state[:5]]
+    assert run.steps(20.0, 3) == 0
+    for array, before in zip(run.state[:4], kept, strict=False):
+        np.testing.assert_allclose(array, before, rtol=1e-12, atol=1e-12)
