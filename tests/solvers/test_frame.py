@@ -15,7 +15,7 @@ from pendbench.physics.exact import normal_modes, single_pendulum
 from pendbench.scene.scene import Scene
 from pendbench.solvers.closing import chain_of
 from pendbench.solvers.frame import LONGEST, MOST_SUBSTEPS, take_frames
-from pendbench.solvers.multipliers import Rows, quickness, rows_of
+from pendbench.solvers.multipliers import Rows, pulls_within, rows_of
 from pendbench.solvers.rattle import begin, rattle
 from support.kernels import called
 from support.scenes import chain, random_chain
@@ -38,7 +38,7 @@ class Run:
         return rattle(self.chain, self.state, 0, h, count)
 
     def rows(self) -> Rows:
-        return called(rows_of)(self.state.memory, self.state.room)
+        return called(rows_of)(self.state.memory, self.state.room, len(self.chain.lengths))
 
 
 def rope(n: int, **start) -> Scene:
@@ -118,8 +118,14 @@ def test_a_hanging_rope_asks_for_the_steps_of_its_fastest_oscillation(n: int) ->
 
 def bound(scene: Scene) -> float:
     """W of the module's heading, rad/s, from tensions that are computed elsewhere."""
-    pulls = -tensions(scene, scene.angles, scene.rates) / scene.lengths
-    return math.sqrt(called(quickness)(np.append(0.0, 1.0 / scene.masses), np.pad(pulls, 1)))
+    couplings = np.append(0.0, 1.0 / scene.masses)
+    pulls = np.pad(-tensions(scene, scene.angles, scene.rates) / scene.lengths, 1)
+    squared = 2.0 * ((np.abs(pulls[1:-1]) + np.abs(pulls[2:])) / scene.masses).max()
+    within = called(pulls_within)
+    assert within(couplings, pulls, squared * (1 + 1e-12))
+    assert not within(couplings, pulls, squared * (1 - 1e-12))
+    assert not within(couplings, np.full_like(pulls, np.nan), squared)
+    return math.sqrt(squared)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -30,7 +30,7 @@ class Run:
         """The error in energy, in its scale."""
         scene, state = self.scene, self.state
         found = energy(scene, state.q, state.v) - energy(scene, scene.angles, scene.rates)
-        return float(abs(found) / energy_scale(scene))
+        return float(found / energy_scale(scene))
 
 
 def dense_rattle(scene: Scene, h: float, count: int) -> tuple[FloatArray, FloatArray]:
@@ -82,7 +82,7 @@ def test_masses_over_eight_decades_close() -> None:
         run = Run(scene)
         assert run.steps(1e-5, 200) == 200
         assert run.state.gap[0] < 1e-12
-        assert run.strays < 1e-6
+        assert abs(run.strays) < 1e-6
 
 
 def test_steps_are_the_same_however_they_are_asked_for() -> None:
@@ -103,7 +103,7 @@ def test_a_whip_s_crack_is_taken_in_parts_and_nothing_else() -> None:
     assert max(parts[:500]) == 1.0
     assert max(parts) > 1.0
     assert parts.count(1.0) > 700
-    assert run.strays < 0.005
+    assert abs(run.strays) < 0.005
 
 
 def test_a_cut_step_is_its_parts() -> None:
@@ -115,6 +115,22 @@ def test_a_cut_step_is_its_parts() -> None:
     assert parts.steps(0.05, 80) == 80
     np.testing.assert_array_equal(cut.state.q, parts.state.q)
     assert cut.state.q[0] > 10 * np.pi
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_no_step_is_so_long_that_the_energy_grows(seed: int) -> None:
+    """Stormer-Verlet is unstable where h times the fastest oscillation is above 2: uncut for that, nine of 200 such
+    chains more than doubled their energy. What is lost is the error of long parts, a sixth of the scale at most.
+    """
+    rng = np.random.default_rng(seed)
+    n, decades = int(rng.integers(2, 20)), rng.uniform(0, 4)
+    masses, lengths = 10.0 ** rng.uniform(-decades, decades, n), 10.0 ** rng.uniform(-1, 0.3, n)
+    rates = rng.normal(0, 10, n) * rng.random()
+    run = Run(chain(n, mass=list(masses), length=list(lengths), angle=list(rng.uniform(-3, 3, n)), rate=list(rates)))
+    for _ in range(30):
+        if run.steps(5e-3, 4) < 4:
+            break  # masses too unlike
+        assert -0.2 < run.strays < 0.01
 
 
 def test_what_cannot_be_taken_leaves_the_step_before() -> None:

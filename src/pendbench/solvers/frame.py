@@ -55,7 +55,7 @@ def _frame(chain: Chain, memory: FloatArray, kept: FloatArray, steps: FloatArray
         if 2.0 * steps[1] > MOST_SUBSTEPS:
             return False
         steps[1] *= 2.0
-        rows = rows_of(memory, room)
+        rows = rows_of(memory, room, len(chain.lengths))
         guess_forces(rows, rows.force)
 
 
@@ -71,7 +71,12 @@ def _advance(
     frame: float,
     frames: int,
 ) -> int:
-    state, rows, kept, taken = State(q, v, gap, memory, steps, room), rows_of(memory, room), np.empty_like(memory), 0
+    state, rows, kept, taken = (
+        State(q, v, gap, memory, steps, room),
+        rows_of(memory, room, len(chain.lengths)),
+        np.empty_like(memory),
+        0,
+    )
     if steps[0] == 0.0:
         write_start(chain, state, rows)
     while taken < frames and _frame(chain, memory, kept, steps, room, frame):

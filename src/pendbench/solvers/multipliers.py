@@ -47,11 +47,11 @@ class Rows(NamedTuple):
 
 
 @inlined
-def rows_of(memory: FloatArray, room: FloatArray) -> Rows:
-    """The rows by their names."""
-    m, s, n = memory, room, memory.shape[1] - 2
-    moving, new = (m[5, :n], m[6, :n], m[7, :n]), (s[0, :n], s[1, :n], s[2, :n], s[3, :n])
-    return Rows(m[0], m[1], m[2], m[3], m[4], *moving, *new, s[4, :n], s[5, :n], s[6, :n], s[7, :n])
+def rows_of(memory: FloatArray, room: FloatArray, n: int) -> Rows:
+    """The rows of n rods by their names."""
+    m, s, wide = memory, room, n + 2
+    kept = (m[0, :wide], m[1, :wide], m[2, :wide], m[3, :wide], m[4, :wide], m[5, :n], m[6, :n], m[7, :n])
+    return Rows(*kept, s[0, :n], s[1, :n], s[2, :n], s[3, :n], s[4, :n], s[5, :n], s[6, :n], s[7, :n])
 
 
 @inlined
@@ -196,14 +196,12 @@ def turns_within(rows: Rows, most: float) -> bool:
 
 
 @inlined
-def quickness(couplings: FloatArray, forces: FloatArray) -> float:
-    """W^2, 1/s^2, of multipliers -T / l, N/m; nan where one of them is. W is the bound that `frame` explains.
+def pulls_within(couplings: FloatArray, forces: FloatArray, most: float) -> bool:
+    """Whether W^2 of multipliers -T / l, N/m, is at most `most`, 1/s^2; not where one is nan. W is `frame`'s bound.
 
     couplings (n + 1,) as in `Chain`; forces (n + 2,), from place 1 on.
     """
-    most = 0.0
-    for i in range(1, len(couplings)):
-        squared = 2.0 * (abs(forces[i]) + abs(forces[i + 1])) * couplings[i]
-        if not squared <= most:  # so that nan counts
-            most = squared
-    return most
+    beyond = 0
+    for i in range(len(couplings) - 1):
+        beyond += not 2.0 * (abs(forces[i + 1]) + abs(forces[i + 2])) * couplings[i + 1] <= most
+    return beyond == 0
