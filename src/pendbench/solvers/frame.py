@@ -32,7 +32,7 @@ from pendbench.solvers.multipliers import guess_forces, rows_of
 from pendbench.solvers.rattle import State, begin, take_steps, write_start, write_state
 
 #: A frame that asks for more steps than this is given up.
-MOST_SUBSTEPS = 4096
+MOST_SUBSTEPS = 16384
 
 #: The largest h W. Chains of 5 to 500 links, released horizontally, then keep their energy within 0.6 % of its scale.
 LONGEST = 0.4
