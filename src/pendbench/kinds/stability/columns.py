@@ -135,7 +135,7 @@ _FASTEST: Final = Column(
 STABLE_DT_STIFFEST: Final = Column(
     "stable_dt_stiffest", "rad", ".2g", "step times frequency",
     "the largest stable step times stiffest_rad_per_s: near a method's stability limit (2.8 for RK4, 2 for "
-    "semi-implicit Euler and RATTLE) where stiffness is what limits the step",
+    "semi-implicit Euler) where stiffness is what limits the step",
 )  # fmt: skip
 _RATIO: Final = Column(
     "stable_dt_ratio", "1", ".2g", "of the best", "the largest stable step over that of the scene's best method"
