@@ -77,8 +77,6 @@ def _advance(
         np.empty_like(memory),
         0,
     )
-    if steps[0] == 0.0:
-        write_start(chain, state, rows)
     while taken < frames and _frame(chain, memory, kept, steps, room, frame):
         taken += 1
     if steps[0] > 0.0:
@@ -88,6 +86,7 @@ def _advance(
 
 def take_frames(chain: Chain, state: State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
     """Take steps as `methods.FixedStep` says, each a frame."""
+    write_start(chain, state)
     taken: int = _advance(chain, *state, dt, steps)
     return taken
 

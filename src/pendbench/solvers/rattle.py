@@ -27,7 +27,7 @@ import numpy as np
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import compiled, inlined, part
-from pendbench.solvers.closing import ROD_X, ROD_Y, SPARE, TURN, Chain, write_rods
+from pendbench.solvers.closing import ROD_X, ROD_Y, SPARE, TURN, Chain
 from pendbench.solvers.methods import FixedStep, Form, add
 from pendbench.solvers.multipliers import (
     Rows,
@@ -48,6 +48,8 @@ FINEST = 16384
 _LONGEST, _LONGEST_CALM = 1.0, 0.4
 _FURTHEST, _FURTHEST_CALM = 0.5, 0.15
 _PATIENCE = 100
+
+_ONE = np.int64(1)  # of a 1 numba makes a type of its own, and a second kernel
 
 
 class State(NamedTuple):
@@ -74,15 +76,13 @@ def begin(q: FloatArray, v: FloatArray) -> State:
     return State(q.copy(), v.copy(), np.zeros(1), memory, np.array([0.0, 1.0, 0.0]), room)
 
 
-@inlined
-def write_start(chain: Chain, state: State, rows: Rows) -> None:
-    """The rods, their speeds and turns, of the angles and rates."""
-    room, lengths = state.room, chain.lengths
-    write_rods(state.q, room, ROD_Y)
-    for i in range(len(lengths)):
-        x, y, rate = lengths[i] * room[ROD_X, i], lengths[i] * room[ROD_Y, i], state.v[i]
-        rows.x[i + 1], rows.y[i + 1], rows.speed_x[i], rows.speed_y[i] = x, y, -rate * y, rate * x
-        rows.turns[i] = np.round((state.q[i] - np.arctan2(x, -y)) / TURN)
+def write_start(chain: Chain, state: State) -> None:
+    """Before the first step, the rods, their speeds and turns, of the angles and rates."""
+    if state.steps[0] == 0.0:
+        x, y = chain.lengths * np.sin(state.q), -chain.lengths * np.cos(state.q)
+        state.memory[0, 1:-1], state.memory[1, 1:-1] = x, y
+        state.memory[5, :-2], state.memory[6, :-2] = -state.v * y, state.v * x
+        state.memory[7, :-2] = np.round((state.q - np.arctan2(x, -y)) / TURN)
 
 
 @inlined
@@ -148,7 +148,7 @@ def _in_parts(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatAr
     left = 1.0
     while left > 0.0:
         h = dt / steps[1]
-        if take_steps(chain, memory, steps, room, h, 1, _FURTHEST, (_LONGEST / h) ** 2) == 1:
+        if take_steps(chain, memory, steps, room, h, _ONE, _FURTHEST, (_LONGEST / h) ** 2) == 1:
             left -= 1.0 / steps[1]
         elif steps[1] < FINEST:
             steps[1], steps[2] = 2.0 * steps[1], 0.0
@@ -195,8 +195,6 @@ def _rattle(
 ) -> int:
     """Take steps of dt s, and return how many; where not all could be taken, what is left is of no use."""
     state, rows, taken = State(q, v, gap, memory, steps, room), rows_of(memory, room, len(chain.lengths)), 0
-    if steps[0] == 0.0:
-        write_start(chain, state, rows)
     while taken < count:
         if steps[1] == 1.0:
             taken += take_steps(chain, memory, steps, room, dt, count - taken, _FURTHEST, (_LONGEST / dt) ** 2)
@@ -213,6 +211,7 @@ def _rattle(
 
 def rattle(chain: Chain, state: State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
     """Take steps as `methods.FixedStep` says. A group costs Python a microsecond and more, so it passes arrays."""
+    write_start(chain, state)
     memory, lengths = state.memory.copy(), state.steps.copy()
     taken: int = _rattle(chain, *state, dt, steps)
     if taken < steps:  # to the start of the one that could not be
