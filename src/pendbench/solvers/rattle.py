@@ -21,7 +21,7 @@ Sources: Andersen, J. Comput. Phys. 52 (1983), 24; Hairer, Lubich, Wanner, Geome
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,7 +49,7 @@ _LONGEST, _LONGEST_CALM = 1.0, 0.4
 _FURTHEST, _FURTHEST_CALM = 0.5, 0.15
 _PATIENCE = 100
 
-_ONE = np.int64(1)  # of a 1 numba makes a type of its own, and a second kernel
+_ONE: Any = np.int64(1)  # of a 1 numba makes a type of its own, and a second kernel
 
 
 class State(NamedTuple):
