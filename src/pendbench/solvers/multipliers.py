@@ -17,15 +17,16 @@ _MOST_ITERATIONS = 12
 _CLOSE = 1e-12  # how far a rod may be from its length, relative to it
 _ROUGH = 1e-3  # from where on the matrix of one iteration will not do for the next
 _SMALL, _LARGE = 1e-20, 1e20  # between these, determinants need not be reduced
-_LINKS_BETWEEN = 4  # two looks at that: so many links multiply them by 1e200 at most, since masses end at 1e50
+_LINKS_BETWEEN = 4  # two looks at that: a link makes them twice as large at most, and smaller by its pivot
 
 
 class Rows(NamedTuple):
     """The rods, m, and their multipliers now and in the two steps before, N/m, (n + 2,) from place 1 on; their speeds,
     m/s, and how often each went over the top, counter-clockwise positive, (n,).
 
-    In the room, (n,): the new rods, m; 1 / l^2; how far new rods are from their lengths, over l; and the matrix of the
-    changes of that, eliminated: what neighbours add to a multiplier, what a right side is multiplied by, determinants.
+    In the room, (n,): the new rods, m; 1 / l^2; 1 / (c_i + c_(i+1)), kg; how far new rods are from their lengths, over
+    l; and the matrix of the changes of that, over k (c_i + c_(i+1)) and eliminated: what neighbours add to a
+    multiplier, what a right side is multiplied by, determinants.
     """
 
     x: FloatArray
@@ -39,6 +40,7 @@ class Rows(NamedTuple):
     new_x: FloatArray
     new_y: FloatArray
     inverse_square: FloatArray
+    inertia: FloatArray
     off: FloatArray
     below: FloatArray
     above: FloatArray
@@ -51,7 +53,7 @@ def rows_of(memory: FloatArray, room: FloatArray, n: int) -> Rows:
     """The rows of n rods by their names."""
     m, s, wide = memory, room, n + 2
     kept = (m[0, :wide], m[1, :wide], m[2, :wide], m[3, :wide], m[4, :wide], m[5, :n], m[6, :n], m[7, :n])
-    return Rows(*kept, s[0, :n], s[1, :n], s[2, :n], s[3, :n], s[4, :n], s[5, :n], s[6, :n], s[7, :n])
+    return Rows(*kept, s[0, :n], s[1, :n], s[2, :n], s[3, :n], s[4, :n], s[5, :n], s[6, :n], s[7, :n], s[11, :n])
 
 
 @inlined
@@ -92,13 +94,16 @@ def _write_new_rods(chain: Chain, rows: Rows, h: float, kick: float) -> tuple[in
 
 
 @inlined
-def _write_matrix(chain: Chain, rows: Rows, kick: float) -> None:
-    """How multipliers change the squares of the new rods, over 2 l^2: own ones, those below and those above."""
+def _write_matrix(chain: Chain, rows: Rows) -> None:
+    """How multipliers change the squares of the new rods, over 2 l^2 k (c_i + c_(i+1)), so that units do not matter.
+
+    Own ones, those below and those above.
+    """
     couplings, x, y = chain.couplings, rows.x, rows.y
     for i in range(len(rows.off)):
-        scale, inner, outer = kick * rows.inverse_square[i], couplings[i], couplings[i + 1]
-        new_x, new_y = scale * rows.new_x[i], scale * rows.new_y[i]
-        rows.determinant[i] = (inner + outer) * (new_x * x[i + 1] + new_y * y[i + 1])
+        inner, outer = couplings[i] * rows.inertia[i], couplings[i + 1] * rows.inertia[i]
+        new_x, new_y = rows.inverse_square[i] * rows.new_x[i], rows.inverse_square[i] * rows.new_y[i]
+        rows.determinant[i] = new_x * x[i + 1] + new_y * y[i + 1]
         rows.below[i] = inner * (new_x * x[i] + new_y * y[i])
         rows.above[i] = outer * (new_x * x[i + 2] + new_y * y[i + 2])
 
@@ -111,7 +116,7 @@ def _reduced(determinant: float, before: float) -> tuple[float, float]:
 
 
 @inlined
-def _eliminate(rows: Rows) -> None:
+def _eliminate(rows: Rows, kick: float) -> None:
     """Eliminate the matrix from both ends to the middle: while one waits for a product, the other goes on.
 
     By determinants of its corners, so that divisions come at the end, where none waits for another.
@@ -139,6 +144,7 @@ def _eliminate(rows: Rows) -> None:
         share[i] /= determinant[i]
         below[i] *= share[i]
         above[i] *= share[i]
+        share[i] *= rows.inertia[i] / kick
 
 
 @inlined
@@ -178,8 +184,8 @@ def closes(chain: Chain, rows: Rows, h: float, kick: float) -> bool:
         if open_rods == 0:
             return True
         if again:
-            _write_matrix(chain, rows, kick)
-            _eliminate(rows)
+            _write_matrix(chain, rows)
+            _eliminate(rows, kick)
             again = rough > 0
         _correct(rows)
     return False
