@@ -13,13 +13,13 @@ from pendbench.base.errors import InputError
 from pendbench.commands.run import run_study
 from pendbench.engines.registry import engine
 from pendbench.kinds.scaling.plots import longest_figure
-from pendbench.kinds.scaling.search import FINER
+from pendbench.kinds.scaling.search import FINER, Ladder, best_of, nearest_beyond, next_trial, trial_of
 from pendbench.kinds.scaling.study import _open, chain_of, measure, titles_of
 from pendbench.kinds.scaling.work import RaceRun, StepCost, _memory_taken, measure_race, measure_step_cost
 from pendbench.measures.clock import race
 from pendbench.measures.coarse_motion import CoarseErrors
 from pendbench.measures.known_motion import Known, measure_known
-from pendbench.measures.titles import TITLES, Shown
+from pendbench.measures.titles import TITLES, Shown, title_of
 from pendbench.physics.energy import energy_scale
 from pendbench.report.page import Report
 from pendbench.report.styles import Styles
@@ -57,7 +57,7 @@ def folder(tmp_path_factory):
 
 
 OFF = CoarseErrors(0.5, 0.5, 0.5)
-ON = CoarseErrors(0.0, 0.0, 0.0)
+ON, ENERGY = CoarseErrors(0.0, 0.0, 0.0), title_of("energy")
 
 
 def searched(folder, fastest, steady, stops=math.inf, beyond="too slow", noise=0.0):
@@ -120,6 +120,19 @@ def test_nothing_is_tried_twice_and_few_trials_do(folder):
     tried = [row.title for row in report.tables["trials"] if row.case.method == "rk4"]
     assert tried.count("faithful") == tried.count("energy") < 25
     assert tried.count("moves well") < 80  # from the coarsest step at each length; those are soon lost
+
+
+@pytest.mark.parametrize(("divides", "longest"), [(True, 512), (False, 8)])
+def test_where_a_method_divides_its_steps_a_finer_one_may_be_faster(divides, longest):
+    """Up to 8 links any step is in time, up to 512 those of a third at most, and beyond none."""
+    ladder, trials = Ladder(1.0, 1e-3, fixed=True, shrinks=False, divides=divides), []
+    while (asked := next_trial(trials, ladder)) is not None:
+        n, dt = asked
+        late = n > 512 or (n > 8 and dt > 0.35)
+        trials.append(trial_of(ENERGY, n, dt, RaceRun("ok", "", Shown(1.0, 1.0, 2.0 if late else 0.5))))
+    assert longest / 1.1 <= best_of(trials).n <= longest
+    slow = [trial.dt for trial in trials if trial.n == nearest_beyond(trials).n]
+    assert len(slow) == (4 if divides else 1)
 
 
 def test_chain_that_no_step_keeps_is_none(folder):

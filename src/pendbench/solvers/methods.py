@@ -35,7 +35,8 @@ class FixedStep:
     advance(system, state, first, dt, steps): take the steps from number `first` on, each of dt (s), the one with number
     0 at time 0, and return how many could be taken. order: what it claims. note: a line for the documentation.
     substeps: it divides its step as it sees fit. conserves: its formula keeps the energy. stuck and remedy: what to say
-    where a step could not be taken, and what would help. threads: how many it can use; where more than one, the last argument of advance is how many it may.
+    where a step could not be taken, and what would help. threads: how many it can use; where more than one, the last
+    argument of advance is how many it may.
     """
 
     name: str

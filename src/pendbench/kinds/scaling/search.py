@@ -18,19 +18,24 @@ PRECISION: Final = 1.1
 
 _FEWEST: Final = 8
 
+#: How many finer steps are tried of a method that divides its steps, where one is too slow.
+_TRIED_FINER: Final = 3
+
 
 @dataclass(frozen=True)
 class Ladder:
     """The steps of the trials, s: whole parts of the coarsest, so that chains are looked at at the same times.
 
     fixed: whether the method takes them at all, or chooses its own. shrinks: whether a longer chain begins with a step
-    that is as much shorter.
+    that is as much shorter. divides: whether the method divides steps that are too long, so that a finer one may be
+    faster.
     """
 
     coarsest: float
     finest: float
     fixed: bool
     shrinks: bool = True
+    divides: bool = False
 
     def first(self, best: Trial, n: int) -> float:
         """The step with which to begin with a chain of n links, after a shorter one that held."""
@@ -92,13 +97,19 @@ def next_trial(trials: Sequence[Trial], ladder: Ladder) -> tuple[int, float] | N
     if not trials:
         return _FEWEST, ladder.rung_above(ladder.coarsest)
     last = trials[-1]
-    if last.outcome == "lost" and (finer := ladder.finer(last.dt)) is not None:
+    if _finer_may_hold(trials, ladder) and (finer := ladder.finer(last.dt)) is not None:
         return last.n, finer
     best = best_of(trials)
     if best is None:
         return (last.n // 2, ladder.rung_above(ladder.coarsest)) if last.n > 1 else None
     n = _next_length(trials, best.n)
     return None if n is None else (n, ladder.first(best, n))
+
+
+def _finer_may_hold(trials: Sequence[Trial], ladder: Ladder) -> bool:
+    last = trials[-1]
+    slow = sum(trial.n == last.n and trial.outcome == "too slow" for trial in trials)
+    return last.outcome == "lost" or (last.outcome == "too slow" and ladder.divides and slow <= _TRIED_FINER)
 
 
 def _next_length(trials: Sequence[Trial], longest: int) -> int | None:

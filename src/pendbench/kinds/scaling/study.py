@@ -61,7 +61,8 @@ class Options(StudyFile):
 
     def ladder(self, case: Case, title: Title) -> Ladder:
         """The steps of a case's trials for a title."""
-        return Ladder(self.coarsest, self.finest, fixed=case.dt is not None, shrinks=not title.afar)
+        fixed, divides = case.dt is not None, case.its_method.substeps
+        return Ladder(self.coarsest, self.finest, fixed=fixed, shrinks=not title.afar, divides=divides)
 
     @property
     def every(self) -> float:
