@@ -11,8 +11,8 @@ here, and velocities that keep the rods' lengths are asked for at the end of a c
 
 Where the motion is too fast for the step, as where a whip cracks, it is taken in parts: these are halved where no
 multipliers close one, where one turns a rod far, and where it is long beside the fastest oscillation that `frame`
-bounds. Twice the part is tried again after many steps that would allow it, and after twice as many each time: a change
-costs energy, since the error of the longer part stays, up to 6 % of the scale where steps are as long as they may be.
+bounds. Twice the part is tried again after many steps that would allow it, half as many more each time: a change costs
+energy, since the error of the longer part stays, up to 6 % of the scale where steps are as long as they may be.
 Between changes the step is constant, and up to h W = 0.5 the energy has a band and no slope; above, it can creep, by
 13 % in 100,000 steps of a double pendulum with h W = 0.9 at most. `frame` does neither, for more steps.
 
@@ -47,10 +47,10 @@ from pendbench.solvers.projection import across, solve_rods
 FINEST = 16384
 
 # A part is halved where h W, or a rod's turn, rad, is above the first; twice it is tried where at the end of so many
-# steps in a row, and twice as many each time, both were below the second.
+# steps in a row both were below the second, and each time of as many more.
 _LONGEST, _LONGEST_CALM = 1.0, 0.4
 _FURTHEST, _FURTHEST_CALM = 0.5, 0.15
-_PATIENCE = 100
+_PATIENCE, _RARER = 100, 1.5
 
 _ONE: Any = np.int64(1)  # of a 1 numba makes a type of its own, and a second kernel
 
@@ -160,7 +160,7 @@ def _in_parts(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatAr
             return False
     steps[2] = steps[2] + 1.0 if _is_calm(chain, rows, h) else 0.0
     if steps[2] >= steps[3]:
-        steps[1], steps[2], steps[3] = 0.5 * steps[1], 0.0, 2.0 * steps[3]
+        steps[1], steps[2], steps[3] = 0.5 * steps[1], 0.0, _RARER * steps[3]
         guess_forces(rows, rows.force)
     return True
 
@@ -232,7 +232,7 @@ add(
         form=Form.RODS,
         begin=begin,
         advance=rattle,
-        stuck=f"no forces keep the rods at their lengths, not even in {FINEST} parts of the step",
+        stuck=f"the chain moves too fast for {FINEST} parts of a step",
         remedy="a smaller step might",
         substeps=True,
     )
