@@ -115,7 +115,7 @@ def test_steps_are_the_same_however_they_are_asked_for() -> None:
 
 
 def test_a_whip_s_crack_is_taken_in_parts_and_nothing_else() -> None:
-    """A rope of 200 links released horizontally cracks first at 1.4 s; uncut, it does not close at this step."""
+    """A rope of 200 links released horizontally cracks first at 1.4 s."""
     run, parts = Run(chain(200, mass=1 / 200)), []
     for _ in range(800):
         assert run.steps(1.25e-4, 20) == 20

@@ -29,10 +29,10 @@ from pendbench.solvers.closing import Chain
 from pendbench.solvers.copying import copy_rows
 from pendbench.solvers.methods import FixedStep, Form, add
 from pendbench.solvers.multipliers import guess_forces, rows_of
-from pendbench.solvers.rattle import State, begin, take_steps, write_start, write_state
+from pendbench.solvers.rattle import FINEST, State, begin, take_steps, write_start, write_state
 
 #: A frame that asks for more steps than this is given up.
-MOST_SUBSTEPS = 16384
+MOST_SUBSTEPS = FINEST
 
 #: The largest h W. Chains of 5 to 500 links, released horizontally, then keep their energy within 0.6 % of its scale.
 LONGEST = 0.4
@@ -60,34 +60,18 @@ def _frame(chain: Chain, memory: FloatArray, kept: FloatArray, steps: FloatArray
 
 
 @compiled
-def _advance(
-    chain: Chain,
-    q: FloatArray,
-    v: FloatArray,
-    gap: FloatArray,
-    memory: FloatArray,
-    steps: FloatArray,
-    room: FloatArray,
-    frame: float,
-    frames: int,
-) -> int:
-    state, rows, kept, taken = (
-        State(q, v, gap, memory, steps, room),
-        rows_of(memory, room, len(chain.lengths)),
-        np.empty_like(memory),
-        0,
-    )
-    while taken < frames and _frame(chain, memory, kept, steps, room, frame):
+def _advance(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatArray, dt: float, frames: int) -> int:
+    kept, taken = np.empty_like(memory), 0
+    while taken < frames and _frame(chain, memory, kept, steps, room, dt):
         taken += 1
-    if steps[0] > 0.0:
-        write_state(chain, state, rows)
     return taken
 
 
 def take_frames(chain: Chain, state: State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
     """Take steps as `methods.FixedStep` says, each a frame."""
     write_start(chain, state)
-    taken: int = _advance(chain, *state, dt, steps)
+    taken: int = _advance(chain, state.memory, state.steps, state.room, dt, steps)
+    write_state(chain, state)
     return taken
 
 

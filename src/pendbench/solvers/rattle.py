@@ -165,10 +165,10 @@ def _in_parts(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatAr
     return True
 
 
-@inlined
-def write_state(chain: Chain, state: State, rows: Rows) -> None:
+@compiled
+def _write_state(chain: Chain, state: State) -> None:
     """The angles, the rates that the rods' lengths allow, and the gap."""
-    s, n, lengths = state.room, len(state.q), chain.lengths
+    s, n, lengths, rows = state.room, len(state.q), chain.lengths, rows_of(state.memory, state.room, len(state.q))
     state.gap[0] = 0.0
     for i in range(n):
         x, y = rows.x[i + 1], rows.y[i + 1]
@@ -185,20 +185,16 @@ def write_state(chain: Chain, state: State, rows: Rows) -> None:
     rows.speed_y[0] = between
 
 
+def write_state(chain: Chain, state: State) -> None:
+    """The same after a call; what no step has changed stays as it was."""
+    if state.steps[0] > 0.0:
+        _write_state(chain, state)
+
+
 @compiled
-def _rattle(
-    chain: Chain,
-    q: FloatArray,
-    v: FloatArray,
-    gap: FloatArray,
-    memory: FloatArray,
-    steps: FloatArray,
-    room: FloatArray,
-    dt: float,
-    count: int,
-) -> int:
+def _advance(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatArray, dt: float, count: int) -> int:
     """Take steps of dt s, and return how many; where not all could be taken, what is left is of no use."""
-    state, rows, taken = State(q, v, gap, memory, steps, room), rows_of(memory, room, len(chain.lengths)), 0
+    rows, taken = rows_of(memory, room, len(chain.lengths)), 0
     while taken < count:
         if steps[1] == 1.0:
             taken += take_steps(chain, memory, steps, room, dt, count - taken, _FURTHEST, (_LONGEST / dt) ** 2)
@@ -208,19 +204,18 @@ def _rattle(
             if not _in_parts(chain, memory, steps, room, rows, dt):
                 return taken
             taken += 1
-    if steps[0] > 0.0:
-        write_state(chain, state, rows)
     return taken
 
 
 def rattle(chain: Chain, state: State, first: int, dt: float, steps: int) -> int:  # noqa: ARG001
-    """Take steps as `methods.FixedStep` says. A group costs Python a microsecond and more, so it passes arrays."""
+    """Take steps as `methods.FixedStep` says."""
     write_start(chain, state)
     memory, lengths = state.memory.copy(), state.steps.copy()
-    taken: int = _rattle(chain, *state, dt, steps)
+    taken: int = _advance(chain, state.memory, state.steps, state.room, dt, steps)
     if taken < steps:  # to the start of the one that could not be
         state.memory[:], state.steps[:] = memory, lengths
-        _rattle(chain, *state, dt, taken)
+        _advance(chain, state.memory, state.steps, state.room, dt, taken)
+    write_state(chain, state)
     return taken
 
 
