@@ -8,8 +8,10 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 
+import pebble.pool.process
 import pytest
 from pebble import CONSTS
 
@@ -271,6 +273,19 @@ def test_a_job_is_packed_before_it_is_sent(pool):
     with pytest.raises((pickle.PicklingError, AttributeError)):
         outcomes(pool, job(lambda: None, key="no name to find it by"))
     assert outcomes(pool, job(does.identity, 1))["identity"].value == 1
+
+
+def test_a_worker_that_is_still_starting_as_the_pool_ends_says_nothing(capfd, monkeypatch):
+    stop = pebble.pool.process.stop_process
+
+    def stop_late(worker):
+        time.sleep(1.5)  # by then it has looked for what it shares with the others
+        stop(worker)
+
+    monkeypatch.setattr(pebble.pool.process, "stop_process", stop_late)
+    with LocalPool(WORKERS):
+        pass
+    assert capfd.readouterr() == ("", "")
 
 
 UNGUARDED = {

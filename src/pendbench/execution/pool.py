@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
+from multiprocessing.context import SpawnContext
 from types import TracebackType
 from typing import Any, Final, Protocol, Self
 
@@ -75,20 +76,35 @@ class Executor(Protocol):
         """The outcome of each job, in the order in which they finish. alone: one at a time, for timings."""
 
 
+class _Starting(SpawnContext):
+    """Starts processes, and keeps the locks that were made for them.
+
+    The pool drops its locks before it ends its processes: one that is just starting would look for them, find none, and
+    print a traceback.
+    """
+
+    def __init__(self) -> None:
+        self.locks: list[Any] = []
+
+    def RLock(self) -> Any:  # noqa: N802, the name is multiprocessing's
+        self.locks.append(super().RLock())
+        return self.locks[-1]
+
+
 class LocalPool:
     """Processes of this machine, from `with` to its end."""
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
         self._pool: Any = None
+        self._starting = _Starting()
 
     def __enter__(self) -> Self:
         from pebble import CONSTS, ProcessPool
 
         refuse_without_guard()
         CONSTS.term_timeout = _STOPPING_S
-        context = multiprocessing.get_context("spawn")
-        self._pool = ProcessPool(max_workers=self.workers, context=context, initializer=_begin)
+        self._pool = ProcessPool(max_workers=self.workers, context=self._starting, initializer=_begin)
         with deaf_to_interrupts():
             assert self._pool.active  # asking starts it
         return self
@@ -100,6 +116,7 @@ class LocalPool:
             _share_stopping_time(self.workers)
             self._pool.stop()
         self._pool.join()
+        self._starting.locks.clear()
 
     def run(self, jobs: Iterable[Job], *, alone: bool = False) -> Iterator[Outcome]:
         """The outcome of each job, in the order in which they finish.
