@@ -7,12 +7,16 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
+import numpy as np
 import pytest
 
 from pendbench.base import compiled
+from pendbench.physics.kernels.table import system_of
 from pendbench.solvers.trigonometry import cosine_sine
+from support.scenes import chain
 
 ADD = "def add(x, y):\n    return x + y\n"
 
@@ -50,6 +54,27 @@ euler = fixed_step_methods()["euler"]
 state = euler.begin(np.array([0.0]), np.array([1.0]))
 euler.advance(chain, state, 0, 0.5, 1)
 print(state.q[0])
+"""
+FIND_CHAIN = USE_CHAIN.replace("print(state.q[0])", "print(sum(euler.advance.stats.cache_hits.values()))")
+# Plug-ins that give kernels to one of our systems, and to whatever they choose.
+LEANING = """
+from pendbench.base.compiled import compiled, specialise
+from pendbench.physics.kernels.system import System
+from pendbench.solvers import problem
+
+@compiled
+def expand(system, t, q, v):
+    v[1, 0] = 0.0
+
+specialise(problem.rate_series, System, expand)
+"""
+CHOOSING = """
+from pendbench.base.compiled import chosen_by_type
+from pendbench.solvers import problem
+
+@chosen_by_type(problem.rate_series)
+def choose(system, t, q, v):
+    return None
 """
 PARTS = """
 import math
@@ -147,7 +172,8 @@ def package(tmp_path, monkeypatch):
         (tmp_path / "package" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "package" / name).write_text(text)
     monkeypatch.setattr(compiled, "_PACKAGE", tmp_path / "package")
-    monkeypatch.setattr(compiled, "_sources_outside", [])
+    monkeypatch.setattr(compiled, "_for_their_own", {})
+    monkeypatch.setattr(compiled, "_for_any", {})
     monkeypatch.setattr(compiled.config, "CACHE_DIR", str(tmp_path / "cache"))
     forget()
     yield tmp_path / "package"
@@ -248,21 +274,65 @@ def test_nothing_but_two_functions_gives_kernels_by_type():
             )
 
 
-def test_name_changes_with_a_system_from_outside(package, tmp_path, monkeypatch):
+def names_of(source):
+    """The cache's names for that file's kernels: the common one's, and that of what is kept apart."""
+    forget()
+    return compiled.cache_name(source), compiled.cache_name(source, apart=True)
+
+
+def test_what_a_plugin_gives_to_its_own_types_is_in_one_name_and_what_it_gives_to_any_in_both(package, tmp_path):
     stepping, plugin = package / "solvers/stepping.py", tmp_path / "plugin.py"
-    before = name_of(stepping)
     plugin.write_text(ADD)
-    monkeypatch.setattr(compiled, "_kernels", [])
-    compiled._know_source(package / "physics/laws.py")
-    assert name_of(stepping) == before
-    compiled._know_source(plugin)
-    assert name_of(stepping) != before
+    common, apart = names_of(stepping)
+    compiled._know_source(package / "physics/laws.py", compiled._for_any)
+    assert names_of(stepping) == (common, apart)
+    compiled._know_source(plugin, compiled._for_their_own)
+    with_its_own = names_of(stepping)
+    assert with_its_own[0] == common
+    assert with_its_own[1] != apart
+    compiled._know_source(tmp_path / "another.py", compiled._for_any)
+    assert not {*names_of(stepping)} & {*with_its_own}
+
+
+def test_a_source_that_is_edited_after_it_was_imported_is_known_as_it_was(package, tmp_path):
+    stepping, plugin = package / "solvers/stepping.py", tmp_path / "plugin.py"
+    plugin.write_text(ADD)
+    compiled._know_source(plugin, compiled._for_their_own)
+    before = names_of(stepping)
+    plugin.write_text(ADD.replace("x + y", "x - y"))
+    compiled._know_source(plugin, compiled._for_their_own)
+    assert names_of(stepping) == before
 
 
 def test_system_typed_at_a_prompt_trusts_no_cache(package, monkeypatch):
-    monkeypatch.setattr(compiled, "_sources_outside", [Path("<stdin>")])
-    stepping = package / "solvers/stepping.py"
-    assert name_of(stepping) != name_of(stepping)
+    stepping, names = package / "solvers/stepping.py", set()
+    for _ in range(2):
+        monkeypatch.setattr(compiled, "_for_their_own", {})
+        compiled._know_source(Path("<stdin>"), compiled._for_their_own)
+        names.add(names_of(stepping)[1])
+    assert len(names) == 2
+
+
+class Outside(NamedTuple):
+    value: float
+
+
+OURS = numba.typeof(system_of(chain(3, angle=1.0, duration=1.0)))
+THEIRS = numba.typeof(Outside(1.0))
+KINDS = {
+    "numbers": (numba.types.Tuple(tuple(map(numba.typeof, (1.0, 2, True, None, np.zeros(2))))), True),
+    "alike": (numba.typeof((1.0, 2.0)), True),
+    "ours": (OURS, True),
+    "theirs": (THEIRS, False),
+    "theirs among others": (numba.types.Tuple((OURS, numba.types.Tuple((THEIRS, THEIRS)))), False),
+    "a kernel": (numba.typeof(compiled.part(lambda x: x)), False),
+    "a text": (numba.typeof("text"), False),
+}
+
+
+@pytest.mark.parametrize(("kind", "ours"), KINDS.values(), ids=KINDS)
+def test_only_types_that_bring_nothing_from_outside_are_ours(kind, ours):
+    assert compiled._is_ours(kind) == ours
 
 
 def test_default_is_the_user_s_cache(package, tmp_path, monkeypatch):  # noqa: ARG001
@@ -291,7 +361,7 @@ def test_unwritable_cache_is_replaced_by_one_for_this_process(package, tmp_path,
 def test_numba_s_own_setting_is_left_as_it_was(package):
     before = compiled.config.CACHE_DIR
     kernel = compiled.compiled(lambda x: x + 1)
-    compiled._kernels.remove(kernel)
+    kernel(1)
     assert before == compiled.config.CACHE_DIR
     assert Path(kernel.stats.cache_path).is_relative_to(home())
     assert package.exists()
@@ -316,8 +386,22 @@ def test_plugin_s_kernels_are_neither_stale_nor_in_the_way_of_others(tmp_path, m
     assert run(USE_PLUGIN, cache) == 0.75
     plugin.write_text(PLUGIN.replace("SIGN", "2.0"))
     assert run(USE_PLUGIN, cache) == 0.5
+    assert run(f"import plugin\n{FIND_CHAIN}", cache) == 0
+    assert run(f"import plugin\n{FIND_CHAIN}", cache) == 1
     plugin.unlink()
-    assert run(USE_CHAIN, cache) == 0.5
+    assert run(FIND_CHAIN, cache) == 1  # with and without the plug-in it is the same kernel
+
+
+def test_what_a_plugin_gives_to_our_own_types_is_told_from_what_it_gives_to_its(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "plugin.py").write_text(PLUGIN.replace("SIGN", "1.0"))
+    (tmp_path / "leaning.py").write_text(LEANING)
+    (tmp_path / "choosing.py").write_text(CHOOSING)
+    told = "from pendbench.base import compiled\nprint(len(compiled._for_their_own) + 10 * len(compiled._for_any))"
+    assert run(told, tmp_path) == 0
+    assert run(f"import plugin\n{told}", tmp_path) == 1
+    assert run(f"import leaning\n{told}", tmp_path) == 10
+    assert run(f"import choosing\n{told}", tmp_path) == 10
 
 
 @pytest.mark.skipif(numba.version_info.short != compiled.LINKED_WITH, reason="numba compiles parts in its own way")

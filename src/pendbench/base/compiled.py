@@ -6,6 +6,9 @@ of all sources that its kernels can hold. A kernel reaches what it holds in two 
 of its file; or by the type of an argument (`chosen_by_type`, `specialise`), from a file that it need not know. The
 first differ from file to file, the second are in every hash: an edited solver leaves the kernels of the others alone,
 and edited physics leaves none.
+
+A plug-in's system brings its kernels by type as well. What is compiled for it is kept apart, in a folder named after
+the plug-in's sources too: our processes need not know its type to read the common one, and its find ours there.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from typing import Any, TypeVar, cast
 import llvmlite.binding as llvm
 import numba
 from numba.core import config as numba_config
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher, cpu_target
@@ -33,6 +37,7 @@ from numba.extending import overload
 from pendbench.base.files import user_cache
 
 config: Any = numba_config  # its attributes are set while it is imported
+types: Any = numba.types
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -92,13 +97,17 @@ _WORD = re.compile(r"\w+")
 #: What gives kernels to others by type.
 _BY_TYPE = re.compile(r"\b(?:chosen_by_type|specialise)\b")
 
-_kernels: list[Any] = []
-_sources_outside: list[Path] = []
+#: Of the sources outside the package that give kernels by type, what they were as they came: those that give them to
+#: types of their own, and those that may give them to any.
+_for_their_own: dict[Path, bytes] = {}
+_for_any: dict[Path, bytes] = {}
 
 
-def cache_name(source: Path) -> str:
-    """The name of the folder with the machine code of the kernels in that file."""
-    return f"{source.stem}-{_digest(source, tuple(_sources_outside))}"
+def cache_name(source: Path, *, apart: bool = False) -> str:
+    """The name of a folder with machine code of the kernels in that file: of what is kept apart, or the common one."""
+    outside = {**_for_any, **_for_their_own} if apart else _for_any
+    digest = hashlib.sha256(b"".join([_digest(source), *outside.values()]))
+    return f"{source.stem}-{digest.hexdigest()[:16]}"
 
 
 @cache
@@ -147,12 +156,16 @@ def sources_of(source: Path) -> set[Path]:
 
 
 @cache
-def _digest(source: Path, outside: tuple[Path, ...]) -> str:
+def _digest(source: Path) -> bytes:
     digest = hashlib.sha256(f"numba {numba.__version__}".encode())
-    for path in (*sorted(sources_of(source)), *outside):
-        # What was typed at a prompt has no file to compare: nothing that was compiled before is used for it.
-        digest.update(path.read_bytes() if path.is_file() else os.urandom(16))
-    return digest.hexdigest()[:16]
+    for path in sorted(sources_of(source)):
+        digest.update(_content(path))
+    return digest.digest()
+
+
+def _content(source: Path) -> bytes:
+    # What was typed at a prompt has no file to compare: nothing that was compiled before is used for it.
+    return source.read_bytes() if source.is_file() else os.urandom(16)
 
 
 @cache
@@ -168,13 +181,55 @@ def _home() -> Path:
     return home
 
 
-def _keep_on_disk(kernel: Any) -> None:
-    folder, before = _home() / cache_name(_source(kernel)), config.CACHE_DIR
-    config.CACHE_DIR = str(folder)
-    try:
-        kernel.enable_caching()
-    finally:
-        config.CACHE_DIR = before
+class _OnDisk:
+    """The cache of a kernel, as numba's dispatchers ask for one: the common one, and the one for what is kept apart."""
+
+    def __init__(self, kernel: Any) -> None:
+        self._function, self._source = kernel.py_func, _source(kernel)
+        self._caches: dict[str, Any] = {}
+        _digest(self._source)  # of the sources as they are now: that is what runs, whoever edits them later
+
+    @property
+    def cache_path(self) -> str:
+        """Where the common one is."""
+        return str(_home() / cache_name(self._source))
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """What was compiled for these types, or None."""
+        return self._cache(signature).load_overload(signature, context)
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep what was compiled for these types."""
+        self._cache(signature).save_overload(signature, compiled)
+
+    def flush(self) -> None:
+        """Forget what was kept."""
+        for each in self._caches.values():
+            each.flush()
+
+    def _cache(self, signature: Any) -> Any:
+        ours = self._source in _inside().values() and all(map(_is_ours, signature))
+        name = cache_name(self._source, apart=not ours)
+        if name not in self._caches:
+            before, config.CACHE_DIR = config.CACHE_DIR, str(_home() / name)
+            try:
+                self._caches[name] = FunctionCache(self._function)  # type: ignore[no-untyped-call]
+            finally:
+                config.CACHE_DIR = before
+        return self._caches[name]
+
+
+def _is_ours(kind: Any) -> bool:
+    """Whether a kernel for values of that type holds nothing from outside the package: that comes with its classes."""
+    if isinstance(kind, types.BaseNamedTuple) and not _in_package(kind.instance_class):
+        return False
+    if isinstance(kind, types.BaseTuple):
+        return all(map(_is_ours, kind))
+    return isinstance(kind, types.Number | types.Boolean | types.Array | types.NoneType | types.Literal)
+
+
+def _in_package(its: type) -> bool:
+    return its.__module__.partition(".")[0] == _PACKAGE.name
 
 
 def _source(function: Any) -> Path:
@@ -229,10 +284,10 @@ def _part(function: Kernel, options: Any, its: type[_Part]) -> Kernel:
 
 
 def _compiled(function: Kernel, options: Any) -> Kernel:
-    kernel: Kernel = numba.njit(**options)(function)
-    _keep_on_disk(kernel)
-    _kernels.append(kernel)
-    return kernel
+    kernel: Any = numba.njit(**options)(function)
+    _home()  # as the settings are now
+    kernel._cache = _OnDisk(kernel)
+    return cast(Kernel, kernel)
 
 
 def specialise(
@@ -246,7 +301,7 @@ def specialise(
     where: and where this is true of the numba types of its fields. The choice is made while compiling, by the type of
     s: what a kernel asks for itself has both answers compiled, and one of them thrown away.
     """
-    _know_source(_source(kernel))
+    _know_source(_source(kernel), _for_any if _in_package(system) else _for_their_own)
 
     def choose(s: Any, *rest: Any) -> Callable[..., None] | None:  # noqa: ARG001
         if getattr(s, "instance_class", None) is not system or not where(dict(zip(s.fields, s.types, strict=True))):
@@ -265,17 +320,14 @@ def chosen_by_type(generic: Callable[..., Any]) -> Callable[[Kernel], Kernel]:
 
     That is a function of the same arguments, or None where the types are not its own.
     """
-    return overload(generic, jit_options=_INLINED, strict=False)
+
+    def decorated(choose: Kernel) -> Kernel:
+        _know_source(_source(choose), _for_any)
+        return overload(generic, jit_options=_INLINED, strict=False)(choose)
+
+    return decorated
 
 
-def _know_source(source: Path) -> None:
-    """Give a process that has a system from outside the package a cache of its own.
-
-    In the common one nobody would notice that kernels for that system are stale, and the name of its type would keep
-    every process that cannot import it from reading the cache at all.
-    """
-    if _PACKAGE in source.parents or source in _sources_outside:
-        return
-    _sources_outside.append(source)
-    for kernel in _kernels:
-        _keep_on_disk(kernel)
+def _know_source(source: Path, outside: dict[Path, bytes]) -> None:
+    if source not in _inside().values() and _PACKAGE not in source.parents:
+        outside.setdefault(source, hashlib.sha256(_content(source)).digest())
