@@ -186,6 +186,7 @@ def forget():
         compiled._imported,
         compiled._arriving_by_type,
         compiled._digest,
+        compiled._digest_alone,
         compiled._home,
     ):
         function.cache_clear()

@@ -95,7 +95,7 @@ _INLINED: Any = {**_PART, "forceinline": True}
 _IMPORT = re.compile(r"^[ \t]*(?:from|import)[ \t]+([\w.]+)(?=(.*?)(?:\n[ \t]*\n|\Z))", re.DOTALL | re.MULTILINE)
 _WORD = re.compile(r"\w+")
 #: What gives kernels to others by type.
-_BY_TYPE = re.compile(r"\b(?:chosen_by_type|specialise)\b")
+_BY_TYPE = ("chosen_by_type", "specialise")
 
 #: Of the sources outside the package that give kernels by type, what they were as they came: those that give them to
 #: types of their own, and those that may give them to any.
@@ -144,7 +144,8 @@ def _with_imports(sources: Iterable[Path]) -> set[Path]:
 @cache
 def _arriving_by_type() -> frozenset[Path]:
     """The sources of what any kernel may hold without knowing it."""
-    return frozenset(_with_imports(path for path in _inside().values() if _BY_TYPE.search(path.read_text("utf-8"))))
+    texts = {path: path.read_text("utf-8") for path in _inside().values()}
+    return frozenset(_with_imports(path for path in texts if any(name in texts[path] for name in _BY_TYPE)))
 
 
 def sources_of(source: Path) -> set[Path]:
@@ -157,15 +158,17 @@ def sources_of(source: Path) -> set[Path]:
 
 @cache
 def _digest(source: Path) -> bytes:
-    digest = hashlib.sha256(f"numba {numba.__version__}".encode())
-    for path in sorted(sources_of(source)):
-        digest.update(_content(path))
+    digest, its = hashlib.sha256(f"numba {numba.__version__}".encode()), sources_of(source)
+    for path in _inside().values():
+        if path in its:
+            digest.update(_digest_alone(path))
     return digest.digest()
 
 
-def _content(source: Path) -> bytes:
+@cache
+def _digest_alone(source: Path) -> bytes:
     # What was typed at a prompt has no file to compare: nothing that was compiled before is used for it.
-    return source.read_bytes() if source.is_file() else os.urandom(16)
+    return hashlib.sha256(source.read_bytes() if source.is_file() else os.urandom(16)).digest()
 
 
 @cache
@@ -330,4 +333,4 @@ def chosen_by_type(generic: Callable[..., Any]) -> Callable[[Kernel], Kernel]:
 
 def _know_source(source: Path, outside: dict[Path, bytes]) -> None:
     if source not in _inside().values() and _PACKAGE not in source.parents:
-        outside.setdefault(source, hashlib.sha256(_content(source)).digest())
+        outside.setdefault(source, _digest_alone(source))
