@@ -61,24 +61,24 @@ def records(out: Path) -> int:
 def undisturbed(study, tmp_path_factory) -> list[list[str]]:
     """The table of the study when nothing happens to it, found by two workers."""
     out = tmp_path_factory.mktemp("undisturbed")
-    ended(started(study, out))
+    ended(started(study, out, "--bare", "--jobs", "2"))
     assert records(out) > MOMENTS[-1]
     return table(out)
 
 
 def test_one_worker_writes_what_two_write(study, undisturbed, tmp_path):
-    ended(started(study, tmp_path, "--jobs", "1"))
+    ended(started(study, tmp_path, "--bare", "--jobs", "1"))
     assert table(tmp_path) == undisturbed
 
 
 def test_a_study_that_is_killed_again_and_again_gives_the_same_table(study, undisturbed, tmp_path):
     done = 0
     for moment in MOMENTS:
-        killed_in_writing("work/*.json", moment - done, study, "--out", tmp_path, "--jobs", "2")
+        killed_in_writing("work/*.json", moment - done, study, "--out", tmp_path, "--bare", "--jobs", "2")
         done = records(tmp_path)
         assert done == moment - 1
     assert not (tmp_path / "cases.csv").exists()
-    assert "kept from before" in ended(started(study, tmp_path))
+    assert "kept from before" in ended(started(study, tmp_path, "--bare", "--jobs", "2"))
     assert table(tmp_path) == undisturbed
 
 
@@ -128,7 +128,7 @@ def test_what_was_found_without_a_truth_is_not_taken_for_what_is_found_with_it(s
 
 def test_studies_into_one_folder_wait_for_each_other(study, undisturbed, tmp_path):
     with alone_in(tmp_path, pytest.fail):
-        both = [started(study, tmp_path, "--jobs", jobs, "--fresh") for jobs in "12"]
+        both = [started(study, tmp_path, "--jobs", jobs, "--bare", "--fresh") for jobs in "12"]
         for each in both:
             assert each.stderr.readline().startswith("waiting for another study in this folder")
     for each in both:
