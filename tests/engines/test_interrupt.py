@@ -6,6 +6,7 @@ how soon it answers.
 
 from __future__ import annotations
 
+import dataclasses
 import pkgutil
 import re
 import signal
@@ -17,6 +18,7 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
+from numba.core.registry import CPUDispatcher
 
 import pendbench as pb
 from pendbench.base import compiled
@@ -99,9 +101,10 @@ def test_no_kernel_that_python_calls_returns_a_named_tuple():
         for _, name, _ in pkgutil.walk_packages(pb.__path__, "pendbench.")
         if name.startswith(("pendbench.solvers.", "pendbench.physics."))
     ]
-    for name in modules:
-        import_module(name)
-    kernels = [kernel.py_func for kernel in compiled._kernels if not isinstance(kernel, compiled._Part)]
+    found = [
+        value for name in modules for value in vars(import_module(name)).values() if isinstance(value, CPUDispatcher)
+    ]
+    kernels = {kernel.py_func for kernel in found if not isinstance(kernel, compiled._Part)}
     assert len(kernels) > 30
     for kernel in kernels:
         returned = get_type_hints(kernel).get("return")
@@ -122,6 +125,22 @@ def test_calls_of_an_engine_stay_short_and_add_up(monkeypatch):
     in_one = FixedRun(chain(2), fixed_step_methods()["rk4"], 1e-3)
     in_one.advance(5000)
     np.testing.assert_array_equal(run.theta[-1], in_one.state().theta)
+
+
+def test_a_run_that_was_interrupted_is_not_well_and_goes_no_further():
+    rk4 = fixed_step_methods()["rk4"]
+
+    def interrupted(*given):
+        rk4.advance(*given)
+        raise KeyboardInterrupt
+
+    run = FixedRun(chain(2), dataclasses.replace(rk4, advance=interrupted), 1e-3)
+    with pytest.raises(KeyboardInterrupt):
+        run.advance(10)
+    before = run.state()
+    run.advance(10)
+    assert run.health() == ("error", "it was interrupted, and how many steps it had taken is not known")
+    np.testing.assert_array_equal(run.state().theta, before.theta)
 
 
 @pytest.mark.parametrize("work", ["adaptive", "taylor"])

@@ -73,16 +73,25 @@ def gate(
     described = _text("name", name), _text("version", version), _effects(names_of(effects, "effects", "an effect"))
     source = _source(engine, step, state, start or world, health, order, precision, *described)
     only, limit = names_of(methods, "methods", "a method"), number("time_limit", time_limit, LIMIT)
-    workers = processors() if jobs is None else jobs
-    if type(workers) is not int or not 0 <= workers <= _MOST_WORKERS:
-        raise InputError(f"jobs is {show(jobs)}; allowed: 0 to {_MOST_WORKERS}")
-    if type(seed) is not int or seed < 0:
-        raise InputError(f"seed is {show(seed)}; allowed: a whole number from 0 on")
+    workers, begin = _workers(jobs), _seed(seed)
     if workers and can_travel(source):
         from pendbench.base.processes import refuse_without_guard
 
         refuse_without_guard()
-    return run_gate(Asked(source, only, seed, workers, limit), _Silence())
+    return run_gate(Asked(source, only, begin, workers, limit), _Silence())
+
+
+def _workers(jobs: Any) -> int:
+    workers = processors() if jobs is None else jobs
+    if type(workers) is not int or not 0 <= workers <= _MOST_WORKERS:
+        raise InputError(f"jobs is {show(jobs)}; allowed: 0 to {_MOST_WORKERS}")
+    return workers
+
+
+def _seed(seed: Any) -> int:
+    if type(seed) is not int or seed < 0:
+        raise InputError(f"seed is {show(seed)}; allowed: a whole number from 0 on")
+    return seed
 
 
 def run_gate(asked: Asked, watcher: Watcher) -> Gate:

@@ -87,22 +87,26 @@ _VARIABLES: Final[Mapping[Form, Callable[[Scene, FixedStep], _Variables]]] = {
 }
 
 
+_INTERRUPTED: Final = Fault("error", "it was interrupted, and how many steps it had taken is not known")
+
+
 class FixedRun:
     """A method with a fixed step, in the variables of its form. threads: how many it may use."""
 
     def __init__(self, scene: Scene, method: FixedStep, dt: float, threads: float = 1) -> None:
-        self._method, self._dt, self._taken, self._stuck = method, dt, 0, False
+        self._method, self._dt, self._taken = method, dt, 0
+        self._fault: Fault | None = None
         self._last = (int(threads),) if method.threads > 1 else ()
         self._variables = _VARIABLES[method.form](scene, method)
 
     def advance(self, steps: int) -> None:
         """Take `steps` steps, or as many as can be taken."""
-        if self._stuck:
+        if self._fault is not None:
             return
-        its = self._variables
+        its, self._fault = self._variables, _INTERRUPTED  # unless it comes to its end
         taken = self._method.advance(its.system, its.state, self._taken, self._dt, steps, *self._last)
         self._taken += taken
-        self._stuck = taken < steps
+        self._fault = None if taken == steps else self._stuck()
 
     def state(self) -> State:
         """The state now."""
@@ -110,10 +114,11 @@ class FixedRun:
 
     def health(self) -> Fault | None:
         """Whether it is finite, and whether all steps could be taken."""
-        if self._stuck:
-            where = f"at t = {self._taken * self._dt:.6g} s"
-            return Fault("not converged", f"{self._method.stuck} {where}; {self._method.remedy}")
-        return not_finite(self.state())
+        return self._fault or not_finite(self.state())
+
+    def _stuck(self) -> Fault:
+        where = f"at t = {self._taken * self._dt:.6g} s"
+        return Fault("not converged", f"{self._method.stuck} {where}; {self._method.remedy}")
 
 
 def _limits(settings: Mapping[str, Any], relative: Any) -> control.Limits:

@@ -79,12 +79,10 @@ def write_tensions(system: System, omega: FloatArray, moving: float) -> None:
     scratch[TENSION, min(middle + 1, tip)] = outer
     scratch[TENSION, middle] = inner
     for k in range(middle):
-        i = middle - 1 - k
+        i, j = middle - 1 - k, middle + 1 + k
         inner = scratch[OWN, i] + scratch[PASSED, i] * inner
-        scratch[TENSION, i] = inner
-        i = middle + 1 + k
-        outer = scratch[OWN, i] + scratch[PASSED, i] * outer
-        scratch[TENSION, i + 1] = outer
+        outer = scratch[OWN, j] + scratch[PASSED, j] * outer
+        scratch[TENSION, i], scratch[TENSION, j + 1] = inner, outer
     for i in range(last + 1, tip):
         scratch[TENSION, i + 1] = scratch[OWN, i] + scratch[PASSED, i] * outer
 
