@@ -19,8 +19,11 @@ from pendbench.scene.scene import Scene
 
 #: Up to so many links a method of high order computes the motion; beyond, two finer steps of one for long chains do.
 ACCURATE: Final = 2000
-#: A start that is turned by so much, rad, tells how long the motion can be predicted.
+#: A start that is turned by so much, rad, tells how long the motion can be predicted: while it is off by less than
+#: this, in lengths. A fourth of what a faithful run may be off, since of long chains in the crack of a whip all
+#: solutions are that far from each other, and from the true one.
 TURNED: Final = 1e-6
+PREDICTED: Final = FAITHFUL / 4.0
 
 _TOLERANCES: Final = (1e-9, 1e-8)  # of the motion, and from the turned start: a thousand times what it needs to be
 _FINER: Final = (8, 4)
@@ -56,8 +59,8 @@ def measure_known(scene: Scene, every: float) -> Known:
 
     Two solutions tell how far it is known: of up to `ACCURATE` links by `adaptive`, the other at a looser tolerance and
     from a start that is turned by `TURNED`; of more by `bdf2`, with an eighth and a fourth of `every`. The motion can
-    be predicted as long as the two are within 1 % of the length of each other in e(t), which is asked of the first kind
-    alone; the first swing is known where they agree to 0.5 % of the length.
+    be predicted as long as the two are within `PREDICTED` of each other in e(t), which is asked of the first kind alone;
+    the first swing is known where they agree to 0.5 % of the length.
     """
     accurate = scene.n <= ACCURATE
     why = refusal(engine("analytic"), "adaptive" if accurate else "bdf2", scene)
@@ -115,7 +118,7 @@ class _Followed:
     def goes_on(self, best: FloatArray, other: FloatArray) -> bool:
         """Take the next sample of both, angles (n,) rad, and say whether one more is of use."""
         if self._predicting:
-            self._predicting = bool(distance(self._scene.lengths, best, other - best) < FAITHFUL)
+            self._predicting = bool(distance(self._scene.lengths, best, other - best) < PREDICTED)
         if self._predicting:
             self._angles.append(best)
         if self._swinging:
