@@ -59,7 +59,7 @@ def measure_known(scene: Scene, every: float) -> Known:
 
     Two solutions tell how far it is known: of up to `ACCURATE` links by `adaptive`, the other at a looser tolerance and
     from a start that is turned by `TURNED`; of more by `bdf2`, with an eighth and a fourth of `every`. The motion can
-    be predicted as long as the two are within `PREDICTED` of each other in e(t), which is asked of the first kind alone;
+    be predicted as long as they are within `PREDICTED` of each other in e(t), which is asked of the first kind alone;
     the first swing is known where they agree to 0.5 % of the length.
     """
     accurate = scene.n <= ACCURATE
