@@ -214,6 +214,20 @@ def test_titles_share_runs(folder):
     assert sum(map(len, raced.values())) < len(report.tables["trials"])
 
 
+def test_a_run_counts_for_each_title_that_it_wins(folder):
+    """Of 60 to 300 links none is faithful with any step, but longer ones are with those that keep their energy."""
+
+    def race(case, _every, _titles):
+        n = case.scene.n
+        return RaceRun("ok", "", Shown(1.0, 1.0, n / 800, error=0.5 if 60 < n < 300 else 0.0, coarse=ON))
+
+    report = reported(folder, race)
+    for method in ("rk4", "taylor"):
+        row = by_method(report, "longest", "faithful")[method]
+        assert 800 / 1.1 <= row.longest_n <= 800
+        assert (row.outcome, row.shown.error) == ("too slow", 0.0)
+
+
 def test_a_run_that_ended_too_early_for_a_title_is_run_again():
     """It lost its energy half way, and what it may still move like is not known."""
     case, (_, energy, well) = Case(chain(1), "analytic", "rk4", 1e-3), TITLES

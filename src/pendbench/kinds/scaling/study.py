@@ -19,7 +19,7 @@ from pendbench.base.ranges import Step
 from pendbench.base.strict import input_error
 from pendbench.execution.runner import Runner
 from pendbench.execution.tasks import task
-from pendbench.kinds.scaling.search import Ladder, Trial, next_trial, trial_of
+from pendbench.kinds.scaling.search import Ladder, Trial, best_of, next_trial, trial_of
 from pendbench.kinds.scaling.work import RaceRun, StepCost, measure_race, measure_step_cost
 from pendbench.measures.energy import conserves_energy, is_driven
 from pendbench.measures.known_motion import measure_known
@@ -204,16 +204,32 @@ Chain = tuple[Case, int, float]
 
 
 def _trials(claims: Sequence[Claim], options: Options, runner: Runner) -> dict[Claim, list[Trial]]:
-    """Longer and longer chains against the clock; one run counts for all titles that ask for it."""
+    """Longer and longer chains against the clock; a run counts for whatever title it wins, whichever asked for it."""
     found: dict[Claim, list[Trial]] = {claim: [] for claim in claims}
     runs: dict[Chain, RaceRun] = {}
-    number = 0
-    while asked := _asked(found, options):
+    asked, number = _asked(found, options), 0
+    while asked:
         number += 1
         runs |= _raced(_open(asked, runs), f"real time, round {number}", options, runner)
         for (pattern, title), (n, dt) in asked.items():
             found[pattern, title].append(trial_of(title, n, dt, runs[pattern, n, dt]))
+        asked = _asked(found, options)
+        if not asked:
+            _add_wins(found, runs)
+            asked = _asked(found, options)
     return found
+
+
+def _add_wins(found: Mapping[Claim, list[Trial]], runs: Mapping[Chain, RaceRun]) -> None:
+    """Runs that another title asked for, and that win one with a longer chain than any of its own.
+
+    The search for it ended at a shorter chain that no step of its own held; it goes on from the longer one.
+    """
+    for (pattern, title), trials in found.items():
+        for (its, n, dt), run in runs.items():
+            best, trial = best_of(trials), trial_of(title, n, dt, run)
+            if its == pattern and trial.held and (best is None or n > best.n):
+                trials.append(trial)
 
 
 def _asked(found: Mapping[Claim, Sequence[Trial]], options: Options) -> dict[Claim, tuple[int, float]]:
