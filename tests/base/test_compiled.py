@@ -278,7 +278,7 @@ def test_nothing_but_two_functions_gives_kernels_by_type():
 def names_of(source):
     """The cache's names for that file's kernels: the common one's, and that of what is kept apart."""
     forget()
-    return compiled.cache_name(source), compiled.cache_name(source, apart=True)
+    return compiled.cache_name(source), compiled.cache_name(source, frozenset({"plugin.Spring"}))
 
 
 def test_what_a_plugin_gives_to_its_own_types_is_in_one_name_and_what_it_gives_to_any_in_both(package, tmp_path):
@@ -329,6 +329,17 @@ KINDS = {
     "a kernel": (numba.typeof(compiled.part(lambda x: x)), False),
     "a text": (numba.typeof("text"), False),
 }
+
+
+def test_what_is_kept_apart_is_named_after_its_classes(package):
+    """Also where it holds kernels of ours alone: a process without the class could not read the common folder then."""
+    stepping, spring = package / "solvers/stepping.py", frozenset({"plugin.Spring"})
+    assert len({compiled.cache_name(stepping, apart) for apart in (None, frozenset(), spring)}) == 3
+
+
+def test_classes_from_outside_are_found_in_others():
+    nested = numba.types.Tuple((OURS, numba.types.Tuple((THEIRS, THEIRS))))
+    assert set(compiled._outside_classes([OURS, nested])) == {f"{__name__}.Outside"}
 
 
 @pytest.mark.parametrize(("kind", "ours"), KINDS.values(), ids=KINDS)

@@ -24,6 +24,7 @@ import pendbench as pb
 from pendbench.base import compiled
 from pendbench.engines.analytic import runs
 from pendbench.engines.analytic.runs import FixedRun
+from pendbench.engines.registry import engine
 from pendbench.solvers import adaptive, outcome, taylor
 from pendbench.solvers.methods import fixed_step_methods
 from support.installed import installed_engines
@@ -77,9 +78,9 @@ LONG = {
 
 @pytest.mark.parametrize("work", LONG)
 def test_an_interrupt_is_caught_and_what_it_stopped_can_be_begun_again(work):
-    engine = re.split("[ ,]", work)[0]
-    if engine in ("mujoco", "pymunk", "pinocchio", "heyoka", "exudyn") and engine not in installed_engines():
-        pytest.skip(f"{engine} is not installed")
+    name = re.split("[ ,]", work)[0]
+    if name in ("mujoco", "pymunk", "pinocchio", "heyoka", "exudyn") and name not in installed_engines():
+        pytest.skip(f"{name} is not installed")
     child = subprocess.Popen(
         [sys.executable, "-c", CHILD.format(work=LONG[work])], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -127,6 +128,9 @@ def test_calls_of_an_engine_stay_short_and_add_up(monkeypatch):
     np.testing.assert_array_equal(run.theta[-1], in_one.state().theta)
 
 
+NOT_WELL = ("error", "a call to go on did not come to its end, so where it is now is not known")
+
+
 def test_a_run_that_was_interrupted_is_not_well_and_goes_no_further():
     rk4 = fixed_step_methods()["rk4"]
 
@@ -139,7 +143,27 @@ def test_a_run_that_was_interrupted_is_not_well_and_goes_no_further():
         run.advance(10)
     before = run.state()
     run.advance(10)
-    assert run.health() == ("error", "it was interrupted, and how many steps it had taken is not known")
+    assert run.health() == NOT_WELL
+    np.testing.assert_array_equal(run.state().theta, before.theta)
+
+
+@pytest.mark.parametrize("solver", [adaptive, taylor])
+def test_nor_does_one_that_chooses_its_steps(solver, monkeypatch):
+    run = engine("analytic").build(chain(2), solver.__name__.rpartition(".")[2], None)
+    run.advance_to(0.1)
+    integrate = solver.integrate
+
+    def interrupted(*given):
+        integrate(*given)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(solver, "integrate", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run.advance_to(0.5)
+    before = run.state()
+    monkeypatch.undo()
+    assert run.advance_to(1.0) == 0
+    assert run.health() == NOT_WELL
     np.testing.assert_array_equal(run.state().theta, before.theta)
 
 

@@ -8,7 +8,8 @@ first differ from file to file, the second are in every hash: an edited solver l
 and edited physics leaves none.
 
 A plug-in's system brings its kernels by type as well. What is compiled for it is kept apart, in a folder named after
-the plug-in's sources too: our processes need not know its type to read the common one, and its find ours there.
+its class and the files that gave it its kernels, too; the common one can be read by processes that do not know it. A
+file that those import is not looked at: kernels of a plug-in that call each other belong in one file.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -103,10 +104,14 @@ _for_their_own: dict[Path, bytes] = {}
 _for_any: dict[Path, bytes] = {}
 
 
-def cache_name(source: Path, *, apart: bool = False) -> str:
-    """The name of a folder with machine code of the kernels in that file: of what is kept apart, or the common one."""
-    outside = {**_for_any, **_for_their_own} if apart else _for_any
-    digest = hashlib.sha256(b"".join([_digest(source), *outside.values()]))
+def cache_name(source: Path, apart: frozenset[str] | None = None) -> str:
+    """The name of a folder with machine code of the kernels in that file: the common one.
+
+    apart: or the one of what is kept apart, for classes of these names from outside the package.
+    """
+    digest = hashlib.sha256(_digest(source) + b"".join(sorted(_for_any.values())))
+    if apart is not None:
+        digest.update(b"apart" + b"".join(sorted(_for_their_own.values())) + repr(sorted(apart)).encode())
     return f"{source.stem}-{digest.hexdigest()[:16]}"
 
 
@@ -212,7 +217,7 @@ class _OnDisk:
 
     def _cache(self, signature: Any) -> Any:
         ours = self._source in _inside().values() and all(map(_is_ours, signature))
-        name = cache_name(self._source, apart=not ours)
+        name = cache_name(self._source, None if ours else frozenset(_outside_classes(signature)))
         if name not in self._caches:
             before, config.CACHE_DIR = config.CACHE_DIR, str(_home() / name)
             try:
@@ -229,6 +234,15 @@ def _is_ours(kind: Any) -> bool:
     if isinstance(kind, types.BaseTuple):
         return all(map(_is_ours, kind))
     return isinstance(kind, types.Number | types.Boolean | types.Array | types.NoneType | types.Literal)
+
+
+def _outside_classes(kinds: Iterable[Any]) -> Iterator[str]:
+    """The names of the classes from outside the package among these numba types and in them."""
+    for kind in kinds:
+        if isinstance(kind, types.BaseNamedTuple) and not _in_package(kind.instance_class):
+            yield f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}"
+        if isinstance(kind, types.BaseTuple):
+            yield from _outside_classes(kind)
 
 
 def _in_package(its: type) -> bool:

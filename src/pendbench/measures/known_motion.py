@@ -19,10 +19,10 @@ from pendbench.scene.scene import Scene
 
 #: Up to so many links a method of high order computes the motion; beyond, two finer steps of one for long chains do.
 ACCURATE: Final = 2000
-#: A start that is turned by so much, rad, tells how long the motion can be predicted: while it is off by less than
-#: this, in lengths. A fourth of what a faithful run may be off, since of long chains in the crack of a whip all
-#: solutions are that far from each other, and from the true one.
+#: A start that is turned by so much, rad, tells how long the motion can be predicted.
 TURNED: Final = 1e-6
+#: As long as it leads to masses that are off by less than this, in lengths of the chain. It is a fourth of what a
+#: faithful run may be off: just after the crack of a whip all solutions, the true one too, are near 1 % apart.
 PREDICTED: Final = FAITHFUL / 4.0
 
 _TOLERANCES: Final = (1e-9, 1e-8)  # of the motion, and from the turned start: a thousand times what it needs to be

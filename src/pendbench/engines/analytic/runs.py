@@ -19,6 +19,9 @@ from pendbench.solvers.compensated import sum_from
 from pendbench.solvers.dop853 import DOP853
 from pendbench.solvers.methods import FixedStep, Form
 
+#: Of a run that is not asked again: an interrupt, or an error, left it somewhere in the middle.
+_INTERRUPTED: Final = Fault("error", "a call to go on did not come to its end, so where it is now is not known")
+
 
 def _given_up(how: int, t: float) -> Fault | None:
     if how not in outcome.REASONS:
@@ -87,9 +90,6 @@ _VARIABLES: Final[Mapping[Form, Callable[[Scene, FixedStep], _Variables]]] = {
 }
 
 
-_INTERRUPTED: Final = Fault("error", "it was interrupted, and how many steps it had taken is not known")
-
-
 class FixedRun:
     """A method with a fixed step, in the variables of its form. threads: how many it may use."""
 
@@ -135,14 +135,17 @@ class Adaptive:
         # Angles are measured absolutely: a rod that has turned a thousand times is no less well known.
         relative = np.concatenate([np.zeros(scene.n), np.ones(scene.n)])
         self._limits = _limits(settings, relative)
-        self._h, self._outcome = control.FIRST_STEP, outcome.DONE
+        self._h, self._outcome, self._at_work = control.FIRST_STEP, outcome.DONE, False
 
     def advance_to(self, time: float) -> int:
         """Advance to `time` and return how many steps that took."""
+        if self._at_work:
+            return 0
+        self._at_work = True  # for good, unless this comes to its end
         found = adaptive.integrate(self._system, DOP853, self._limits, self._t, self._h, time, self._y)
         taken: int = found.accepted + found.rejected
         self._t, self._h, self._outcome = found.t, found.h, found.outcome
-        self._limits = control.less(self._limits, taken) if taken else self._limits
+        self._limits, self._at_work = control.less(self._limits, taken) if taken else self._limits, False
         return taken
 
     def state(self) -> State:
@@ -152,6 +155,8 @@ class Adaptive:
 
     def health(self) -> Fault | None:
         """Whether it is finite and within its limits."""
+        if self._at_work:
+            return _INTERRUPTED
         return _given_up(self._outcome, self._t) or not_finite(self.state())
 
 
@@ -163,16 +168,20 @@ class Taylor:
         self._system, self._t, self._h = series_system_of(scene, order), 0.0, taylor.NO_STEP
         self._series = taylor.series_from(scene.angles, scene.rates, order)
         self._state = State(scene.angles.copy(), scene.rates.copy())
-        self._limits, self._outcome = _limits(settings, 1.0), outcome.DONE
+        self._limits, self._outcome, self._at_work = _limits(settings, 1.0), outcome.DONE, False
 
     def advance_to(self, time: float) -> int:
         """Advance to `time` and return how many series that took."""
+        if self._at_work:
+            return 0
+        self._at_work = True  # for good, unless this comes to its end
         found = taylor.integrate(self._system, self._limits, self._t, self._h, time, self._series)
         taken: int = found.accepted
         self._t, self._h, self._outcome = found.t, found.h, found.outcome
         self._limits = control.less(self._limits, taken) if taken else self._limits
         reached = time - self._t if self._outcome == outcome.DONE else 0.0
         taylor.state_at(reached, self._series, *self._state[:2])
+        self._at_work = False
         return taken
 
     def state(self) -> State:
@@ -181,4 +190,6 @@ class Taylor:
 
     def health(self) -> Fault | None:
         """Whether it is finite and within its limits."""
+        if self._at_work:
+            return _INTERRUPTED
         return _given_up(self._outcome, self._t) or not_finite(self._state)

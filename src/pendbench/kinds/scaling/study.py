@@ -223,12 +223,12 @@ def _trials(claims: Sequence[Claim], options: Options, runner: Runner) -> dict[C
 def _add_wins(found: Mapping[Claim, list[Trial]], runs: Mapping[Chain, RaceRun]) -> None:
     """Runs that another title asked for, and that win one with a longer chain than any of its own.
 
-    The search for it ended at a shorter chain that no step of its own held; it goes on from the longer one.
+    Its search had ended below a chain that lost with every step, though longer ones win; it goes on from those.
     """
     for (pattern, title), trials in found.items():
-        for (its, n, dt), run in runs.items():
-            best, trial = best_of(trials), trial_of(title, n, dt, run)
-            if its == pattern and trial.held and (best is None or n > best.n):
+        for (_, n, dt), run in [each for each in runs.items() if each[0][0] == pattern]:
+            trial, best = trial_of(title, n, dt, run), best_of(trials)
+            if trial.held and (best is None or n > best.n):
                 trials.append(trial)
 
 
