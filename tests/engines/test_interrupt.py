@@ -132,11 +132,13 @@ NOT_WELL = ("error", "a call to go on did not come to its end, so where it is no
 
 
 def test_a_run_that_was_interrupted_is_not_well_and_goes_no_further():
-    rk4 = fixed_step_methods()["rk4"]
+    rk4, calls = fixed_step_methods()["rk4"], []
 
     def interrupted(*given):
-        rk4.advance(*given)
-        raise KeyboardInterrupt
+        calls.append(rk4.advance(*given))
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return calls[-1]
 
     run = FixedRun(chain(2), dataclasses.replace(rk4, advance=interrupted), 1e-3)
     with pytest.raises(KeyboardInterrupt):
