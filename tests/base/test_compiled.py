@@ -339,12 +339,12 @@ def test_what_is_kept_apart_is_named_after_its_classes(package):
 
 def test_classes_from_outside_are_found_in_others():
     nested = numba.types.Tuple((OURS, numba.types.Tuple((THEIRS, THEIRS))))
-    assert set(compiled._outside_classes([OURS, nested])) == {f"{__name__}.Outside"}
+    assert set(compiled._from_outside([OURS, nested])) == {f"{__name__}.Outside"}
 
 
 @pytest.mark.parametrize(("kind", "ours"), KINDS.values(), ids=KINDS)
 def test_only_types_that_bring_nothing_from_outside_are_ours(kind, ours):
-    assert compiled._is_ours(kind) == ours
+    assert (not list(compiled._from_outside([kind]))) == ours
 
 
 def test_default_is_the_user_s_cache(package, tmp_path, monkeypatch):  # noqa: ARG001

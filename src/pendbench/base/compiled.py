@@ -107,7 +107,7 @@ _for_any: dict[Path, bytes] = {}
 def cache_name(source: Path, apart: frozenset[str] | None = None) -> str:
     """The name of a folder with machine code of the kernels in that file: the common one.
 
-    apart: or the one of what is kept apart, for classes of these names from outside the package.
+    apart: or the one of what is kept apart, for what comes from outside the package by these names.
     """
     digest = hashlib.sha256(_digest(source) + b"".join(sorted(_for_any.values())))
     if apart is not None:
@@ -216,8 +216,9 @@ class _OnDisk:
             each.flush()
 
     def _cache(self, signature: Any) -> Any:
-        ours = self._source in _inside().values() and all(map(_is_ours, signature))
-        name = cache_name(self._source, None if ours else frozenset(_outside_classes(signature)))
+        foreign = frozenset(_from_outside(signature))
+        ours = not foreign and self._source in _inside().values()
+        name = cache_name(self._source, None if ours else foreign)
         if name not in self._caches:
             before, config.CACHE_DIR = config.CACHE_DIR, str(_home() / name)
             try:
@@ -227,22 +228,18 @@ class _OnDisk:
         return self._caches[name]
 
 
-def _is_ours(kind: Any) -> bool:
-    """Whether a kernel for values of that type holds nothing from outside the package: that comes with its classes."""
-    if isinstance(kind, types.BaseNamedTuple) and not _in_package(kind.instance_class):
-        return False
-    if isinstance(kind, types.BaseTuple):
-        return all(map(_is_ours, kind))
-    return isinstance(kind, types.Number | types.Boolean | types.Array | types.NoneType | types.Literal)
+def _from_outside(kinds: Iterable[Any]) -> Iterator[str]:
+    """What may bring a kernel for values of these numba types code from outside the package, by name.
 
-
-def _outside_classes(kinds: Iterable[Any]) -> Iterator[str]:
-    """The names of the classes from outside the package among these numba types and in them."""
+    That comes with its classes; and of types that are neither numbers nor made of them nobody can tell.
+    """
     for kind in kinds:
         if isinstance(kind, types.BaseNamedTuple) and not _in_package(kind.instance_class):
             yield f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}"
         if isinstance(kind, types.BaseTuple):
-            yield from _outside_classes(kind)
+            yield from _from_outside(kind)
+        elif not isinstance(kind, types.Number | types.Boolean | types.Array | types.NoneType | types.Literal):
+            yield type(kind).__name__
 
 
 def _in_package(its: type) -> bool:

@@ -126,32 +126,23 @@ def _limits(settings: Mapping[str, Any], relative: Any) -> control.Limits:
     return control.Limits(float(settings["tolerance"]), relative, smallest, most_steps)
 
 
-class Adaptive:
-    """An embedded pair with error control and compensated summation. begin: the time of the scene's start, s."""
+class _ChoosingSteps:
+    """A run that chooses its steps; how it advances, and what its state is, its class says. begin: its time, s."""
 
-    def __init__(self, scene: Scene, settings: Mapping[str, Any], begin: float = 0.0) -> None:
-        self._system, self._t = system_of(scene), begin
-        self._y = sum_from(np.concatenate([scene.angles, scene.rates]))
-        # Angles are measured absolutely: a rod that has turned a thousand times is no less well known.
-        relative = np.concatenate([np.zeros(scene.n), np.ones(scene.n)])
-        self._limits = _limits(settings, relative)
-        self._h, self._outcome, self._at_work = control.FIRST_STEP, outcome.DONE, False
+    def __init__(self, settings: Mapping[str, Any], relative: Any, begin: float, first_step: float) -> None:
+        self._limits, self._t, self._h = _limits(settings, relative), begin, first_step
+        self._outcome, self._at_work = outcome.DONE, False
 
     def advance_to(self, time: float) -> int:
         """Advance to `time` and return how many steps that took."""
         if self._at_work:
             return 0
         self._at_work = True  # for good, unless this comes to its end
-        found = adaptive.integrate(self._system, DOP853, self._limits, self._t, self._h, time, self._y)
+        found = self._integrate(time)
         taken: int = found.accepted + found.rejected
         self._t, self._h, self._outcome = found.t, found.h, found.outcome
         self._limits, self._at_work = control.less(self._limits, taken) if taken else self._limits, False
         return taken
-
-    def state(self) -> State:
-        """The state now."""
-        n, value = len(self._y.value) // 2, self._y.value
-        return State(value[:n].copy(), value[n:].copy())
 
     def health(self) -> Fault | None:
         """Whether it is finite and within its limits."""
@@ -159,37 +150,46 @@ class Adaptive:
             return _INTERRUPTED
         return _given_up(self._outcome, self._t) or not_finite(self.state())
 
+    def state(self) -> State:
+        """The state now."""
+        raise NotImplementedError
 
-class Taylor:
+    def _integrate(self, time: float) -> outcome.Reached:
+        raise NotImplementedError
+
+
+class Adaptive(_ChoosingSteps):
+    """An embedded pair with error control and compensated summation. begin: the time of the scene's start, s."""
+
+    def __init__(self, scene: Scene, settings: Mapping[str, Any], begin: float = 0.0) -> None:
+        # Angles are measured absolutely: a rod that has turned a thousand times is no less well known.
+        relative = np.concatenate([np.zeros(scene.n), np.ones(scene.n)])
+        super().__init__(settings, relative, begin, control.FIRST_STEP)
+        self._system, self._y = system_of(scene), sum_from(np.concatenate([scene.angles, scene.rates]))
+
+    def _integrate(self, time: float) -> outcome.Reached:
+        return adaptive.integrate(self._system, DOP853, self._limits, self._t, self._h, time, self._y)
+
+    def state(self) -> State:
+        n, value = len(self._y.value) // 2, self._y.value
+        return State(value[:n].copy(), value[n:].copy())
+
+
+class Taylor(_ChoosingSteps):
     """Taylor's method, its order chosen for the tolerance."""
 
     def __init__(self, scene: Scene, settings: Mapping[str, Any]) -> None:
+        super().__init__(settings, 1.0, 0.0, taylor.NO_STEP)
         order = taylor.order_for(settings["tolerance"])
-        self._system, self._t, self._h = series_system_of(scene, order), 0.0, taylor.NO_STEP
+        self._system = series_system_of(scene, order)
         self._series = taylor.series_from(scene.angles, scene.rates, order)
         self._state = State(scene.angles.copy(), scene.rates.copy())
-        self._limits, self._outcome, self._at_work = _limits(settings, 1.0), outcome.DONE, False
 
-    def advance_to(self, time: float) -> int:
-        """Advance to `time` and return how many series that took."""
-        if self._at_work:
-            return 0
-        self._at_work = True  # for good, unless this comes to its end
+    def _integrate(self, time: float) -> outcome.Reached:
         found = taylor.integrate(self._system, self._limits, self._t, self._h, time, self._series)
-        taken: int = found.accepted
-        self._t, self._h, self._outcome = found.t, found.h, found.outcome
-        self._limits = control.less(self._limits, taken) if taken else self._limits
-        reached = time - self._t if self._outcome == outcome.DONE else 0.0
+        reached = time - found.t if found.outcome == outcome.DONE else 0.0
         taylor.state_at(reached, self._series, *self._state[:2])
-        self._at_work = False
-        return taken
+        return found
 
     def state(self) -> State:
-        """The state now."""
         return State(self._state.theta.copy(), self._state.omega.copy())
-
-    def health(self) -> Fault | None:
-        """Whether it is finite and within its limits."""
-        if self._at_work:
-            return _INTERRUPTED
-        return _given_up(self._outcome, self._t) or not_finite(self._state)
