@@ -13,11 +13,11 @@ from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import inlined
 from pendbench.solvers.closing import Chain
 
-_MOST_ITERATIONS = 12
-_CLOSE = 1e-12  # how far a rod may be from its length, relative to it
+MOST_ITERATIONS = 12
+CLOSE = 1e-12  # how far a rod may be from its length, relative to it
 _ROUGH = 1e-3  # from where on the matrix of one iteration will not do for the next
 _SMALL, _LARGE = 1e-20, 1e20  # between these, determinants need not be reduced
-_LINKS_BETWEEN = 4  # two looks at that: a link makes them twice as large at most, and smaller by its pivot
+_LINKS_BETWEEN = 8  # two looks at that: a link makes them twice as large at most, and smaller by its pivot
 
 
 class Rows(NamedTuple):
@@ -26,7 +26,7 @@ class Rows(NamedTuple):
 
     In the room, (n,): the new rods, m; 1 / l^2; 1 / (c_i + c_(i+1)), kg; how far new rods are from their lengths, over
     l; and the matrix of the changes of that, over k (c_i + c_(i+1)) and eliminated: what neighbours add to a
-    multiplier, what a right side is multiplied by, determinants.
+    multiplier, what a right side is multiplied by, determinants; (n + 1,): the two off the diagonal, multiplied.
     """
 
     x: FloatArray
@@ -46,6 +46,7 @@ class Rows(NamedTuple):
     above: FloatArray
     share: FloatArray
     determinant: FloatArray
+    product: FloatArray
 
 
 @inlined
@@ -53,7 +54,16 @@ def rows_of(memory: FloatArray, room: FloatArray, n: int) -> Rows:
     """The rows of n rods by their names."""
     m, s, wide = memory, room, n + 2
     kept = (m[0, :wide], m[1, :wide], m[2, :wide], m[3, :wide], m[4, :wide], m[5, :n], m[6, :n], m[7, :n])
-    return Rows(*kept, s[0, :n], s[1, :n], s[2, :n], s[3, :n], s[4, :n], s[5, :n], s[6, :n], s[7, :n], s[11, :n])
+    found = (s[0, :n], s[1, :n], s[2, :n], s[3, :n], s[4, :n], s[5, :n], s[6, :n], s[7, :n], s[11, :n], s[10, : n + 1])
+    return Rows(*kept, *found)
+
+
+@inlined
+def prepare_rows(chain: Chain, rows: Rows) -> None:
+    """Write what does not change from step to step."""
+    for i in range(len(rows.off)):
+        rows.inverse_square[i] = 1.0 / (chain.lengths[i] * chain.lengths[i])
+        rows.inertia[i] = 1.0 / (chain.couplings[i] + chain.couplings[i + 1])
 
 
 @inlined
@@ -74,8 +84,8 @@ def extrapolate_forces(rows: Rows) -> None:
 
 
 @inlined
-def _write_new_rods(chain: Chain, rows: Rows, h: float, kick: float) -> tuple[int, int]:
-    """The rods after a step of h s, with k of `kick`, s^2; how many are not of their lengths, and how many are far off.
+def write_new_rods(chain: Chain, rows: Rows, h: float, kick: float, most: float) -> tuple[int, int]:
+    """The rods after a step of h s, with k of `kick`, s^2; how many are off by more than `most`, and how many by far.
 
     Counted, since a loop that looks for the largest does not run in vector registers.
     """
@@ -88,7 +98,7 @@ def _write_new_rods(chain: Chain, rows: Rows, h: float, kick: float) -> tuple[in
         new_y = y[i + 1] + h * rows.speed_y[i] + own * y[i + 1] - out * y[i + 2] - back * y[i]
         rows.new_x[i], rows.new_y[i] = new_x, new_y
         off[i] = 0.5 - 0.5 * rows.inverse_square[i] * (new_x * new_x + new_y * new_y)
-        open_rods += not abs(off[i]) <= _CLOSE
+        open_rods += not abs(off[i]) <= most
         rough += not abs(off[i]) <= _ROUGH
     return open_rods, rough
 
@@ -110,9 +120,8 @@ def _write_matrix(chain: Chain, rows: Rows) -> None:
 
 @inlined
 def _reduced(determinant: float, before: float) -> tuple[float, float]:
-    """A determinant and the one before, over one where they have become large or small."""
-    share = 1.0 if _SMALL < abs(determinant) < _LARGE else 1.0 / determinant
-    return determinant * share, before * share
+    """A determinant and the one before, over the first where it has become large or small."""
+    return (determinant, before) if _SMALL < abs(determinant) < _LARGE else (1.0, before / determinant)
 
 
 @inlined
@@ -121,34 +130,44 @@ def _eliminate(rows: Rows, kick: float) -> None:
 
     By determinants of its corners, so that divisions come at the end, where none waits for another.
     """
-    below, above, share, determinant = rows.below, rows.above, rows.share, rows.determinant
+    below, above, share, determinant, product = rows.below, rows.above, rows.share, rows.determinant, rows.product
     n = len(below)
+    for i in range(1, n):
+        product[i] = below[i] * above[i - 1]
+    product[0], product[n] = 0.0, 0.0
     middle, extra = n // 2, 1 - n % 2  # of an even number the inner side has one more
-    inner, inner_before, passed = 1.0, 0.0, 0.0
-    outer, outer_before, passed_back = 1.0, 0.0, 0.0
+    inner, inner_before, outer, outer_before = 1.0, 0.0, 1.0, 0.0
     for i in range(extra):
-        share[i], inner_before, inner, passed = 1.0, 1.0, determinant[i], above[i]
+        share[i], inner_before, inner = 1.0, 1.0, determinant[i]
     for start in range(0, middle - extra, _LINKS_BETWEEN):
         for k in range(start, min(start + _LINKS_BETWEEN, middle - extra)):
             i, j = extra + k, n - 1 - k
             share[i], share[j] = inner, outer
-            inner, inner_before = determinant[i] * inner - below[i] * passed * inner_before, inner
-            outer, outer_before = determinant[j] * outer - above[j] * passed_back * outer_before, outer
-            determinant[i], determinant[j], passed, passed_back = inner, outer, above[i], below[j]
+            inner, inner_before = determinant[i] * inner - product[i] * inner_before, inner
+            outer, outer_before = determinant[j] * outer - product[j + 1] * outer_before, outer
+            determinant[i], determinant[j] = inner, outer
         inner, inner_before = _reduced(inner, inner_before)
         outer, outer_before = _reduced(outer, outer_before)
     share[middle] = inner * outer
-    pulled, pulled_back = below[middle] * passed * inner_before, above[middle] * passed_back * outer_before
+    pulled, pulled_back = product[middle] * inner_before, product[middle + 1] * outer_before
     determinant[middle] = determinant[middle] * inner * outer - pulled * outer - pulled_back * inner
+    over_kick = 1.0 / kick
     for i in range(n):
-        share[i] /= determinant[i]
-        below[i] *= share[i]
-        above[i] *= share[i]
-        share[i] *= rows.inertia[i] / kick
+        change = share[i] / determinant[i]
+        below[i] *= change
+        above[i] *= change
+        share[i] = change * rows.inertia[i] * over_kick
 
 
 @inlined
-def _correct(rows: Rows) -> None:
+def eliminate(chain: Chain, rows: Rows, kick: float) -> None:
+    """Write the matrix of the new rods, with k of `kick`, s^2, and eliminate it."""
+    _write_matrix(chain, rows)
+    _eliminate(rows, kick)
+
+
+@inlined
+def correct(rows: Rows) -> None:
     """Change the multipliers so that, to first order, the new rods get their lengths."""
     force, off, below, above = rows.force, rows.off, rows.below, rows.above
     n = len(off)
@@ -179,15 +198,14 @@ def closes(chain: Chain, rows: Rows, h: float, kick: float) -> bool:
     Where no rod is far off, the matrix changes little from one iteration to the next and is not eliminated again.
     """
     again = True
-    for _ in range(_MOST_ITERATIONS):
-        open_rods, rough = _write_new_rods(chain, rows, h, kick)
+    for _ in range(MOST_ITERATIONS):
+        open_rods, rough = write_new_rods(chain, rows, h, kick, CLOSE)
         if open_rods == 0:
             return True
         if again:
-            _write_matrix(chain, rows)
-            _eliminate(rows, kick)
+            eliminate(chain, rows, kick)
             again = rough > 0
-        _correct(rows)
+        correct(rows)
     return False
 
 
