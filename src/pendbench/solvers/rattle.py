@@ -51,7 +51,7 @@ FINEST = 16384
 # steps in a row both were below the second, and each time of as many more.
 _LONGEST, _LONGEST_CALM = 1.0, 0.4
 _FURTHEST, _FURTHEST_CALM = 0.5, 0.15
-PATIENCE, RARER = 100, 1.5
+_PATIENCE, _RARER = 100, 1.5
 
 _ONE: Any = np.int64(1)  # of a 1 numba makes a type of its own, and a second kernel
 
@@ -77,7 +77,7 @@ def begin(q: FloatArray, v: FloatArray) -> State:
     """The state at the start, copied."""
     n = len(q)
     memory, room = np.zeros((8, n + 2)), np.zeros((12, n + 2))
-    return State(q.copy(), v.copy(), np.zeros(1), memory, np.array([0.0, 1.0, 0.0, PATIENCE]), room)
+    return State(q.copy(), v.copy(), np.zeros(1), memory, np.array([0.0, 1.0, 0.0, _PATIENCE]), room)
 
 
 def write_start(chain: Chain, state: State) -> None:
@@ -135,7 +135,7 @@ def take_steps(
 
 
 @inlined
-def is_calm(chain: Chain, rows: Rows, h: float) -> bool:
+def _is_calm(chain: Chain, rows: Rows, h: float) -> bool:
     """Whether twice a step of h s can be tried after one; of a rod's turn, the chord is asked."""
     if not pulls_within(chain.couplings, rows.force, (_LONGEST_CALM / h) ** 2):
         return False
@@ -157,9 +157,9 @@ def _in_parts(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatAr
             steps[1], steps[2] = 2.0 * steps[1], 0.0
         else:
             return False
-    steps[2] = steps[2] + 1.0 if is_calm(chain, rows, h) else 0.0
+    steps[2] = steps[2] + 1.0 if _is_calm(chain, rows, h) else 0.0
     if steps[2] >= steps[3]:
-        steps[1], steps[2], steps[3] = 0.5 * steps[1], 0.0, RARER * steps[3]
+        steps[1], steps[2], steps[3] = 0.5 * steps[1], 0.0, _RARER * steps[3]
         guess_forces(rows, rows.force)
     return True
 

@@ -1,0 +1,241 @@
+"""RATTLE with steps that follow how fast the rods turn, on the way back as on the way there: of order 2, O(n) a step.
+
+A step of h s turns rod i by phi_i, the chord of it over its length, and is as long as
+
+    1 / h^2 = 1 / b^2 + (phi / (a h))^2          phi^8 = sum_i phi_i^8
+
+asks: the longest step b where rods rest, and a turn of a rad where they turn fast. phi_i are the turns of that very
+step, so that the way back asks for the same steps, up to what one round leaves: h is found once, with the multipliers
+that close the step. A step that follows the one before it is long where an error in energy is made and short where it
+would be taken back; each crack of a whip then costs energy, as it does where steps are halved and doubled (`rattle`).
+
+Eighth powers, since the largest of the turns itself has a kink wherever another rod becomes the fastest.
+
+Tensions without turns, as in a rope that hangs at rest, ask for short steps as well. So b is the step that was asked
+for, cut into two, four, eight parts where h W is too large, with the bound W of `frame`, and, as there, not joined
+again.
+
+Where the motion is asked for between two steps, a step aside is taken from the one before. The run itself goes on as if
+nobody had looked.
+
+Sources: Huang, Leimkuhler, SIAM J. Sci. Comput. 18 (1997), 239; Hairer, Lubich, Wanner, Geometric Numerical
+Integration, VIII.3.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pendbench.base.arrays import FloatArray
+from pendbench.base.compiled import compiled, inlined
+from pendbench.solvers import rattle
+from pendbench.solvers.closing import Chain
+from pendbench.solvers.copying import copy_rows
+from pendbench.solvers.methods import FixedStep, Form, add
+from pendbench.solvers.multipliers import (
+    CLOSE,
+    MOST_ITERATIONS,
+    Rows,
+    correct,
+    eliminate,
+    prepare_rows,
+    pulls_within,
+    rows_of,
+    write_new_rods,
+)
+from pendbench.solvers.rattle import FINEST, accept, take_steps
+
+#: By how much a step turns the fastest rods, rad; and the largest h W of one that turns them so far, and of one of b.
+TURN, _LONGEST, _LONGEST_AT_REST = 0.15, 1.5, 0.5
+
+_CLOSE = 1e-6  # how far a rod may be from its length after such a step, relative to it; as the third power of less
+_FRESH = 4  # iterations with one matrix; where these are not enough, each has its own
+_CHANGE = 1.25  # of a step from one to the next, as a first guess
+_AT_REST = 0.9  # of b: longer steps are hardly limited by turns
+_THERE = 1e-6  # in steps: so near to the output no step aside is taken, since the mean speed in it would be rounding
+
+_ONE: Any = np.int64(1)  # of a 1 numba makes a type of its own, and a second kernel
+
+#: What is kept in `State.steps`: the length of the last step, s, and of the two before, 0 where there is none; a first
+#: guess of the next; how far the run has come, s; and into how many parts b is cut.
+_LAST, _BEFORE, _OLDER, _NEXT, _TIME, _PARTS = range(6)
+
+
+class State(NamedTuple):
+    """What is kept from step to step, as `rattle.State` says, and the same rows of the step aside to the output."""
+
+    q: FloatArray
+    v: FloatArray
+    gap: FloatArray
+    memory: FloatArray
+    steps: FloatArray
+    room: FloatArray
+    aside: FloatArray
+
+
+def begin(q: FloatArray, v: FloatArray) -> State:
+    """The state at the start, copied."""
+    start, steps = rattle.begin(q, v), np.zeros(6)
+    steps[_PARTS] = 1.0
+    return State(start.q, start.v, start.gap, start.memory, steps, start.room, np.zeros_like(start.memory))
+
+
+@inlined
+def _extrapolate_forces(rows: Rows, fallen: FloatArray, last: float, before: float, older: float) -> None:
+    """The next multipliers, by the parabola through the last three, `last` s after them; the oldest go to `fallen`."""
+    to_before, to_older = last + before, last + before + older
+    share, share_before, share_older = 1.0, 0.0, 0.0
+    if before > 0.0 and older > 0.0:
+        share = to_before * to_older / (before * (before + older))
+        share_before = -last * to_older / (before * older)
+        share_older = last * to_before / ((before + older) * older)
+    force, force_before, force_older = rows.force, rows.force_before, rows.force_older
+    for i in range(len(force)):
+        extrapolated = share * force[i] + share_before * force_before[i] + share_older * force_older[i]
+        fallen[i], force_older[i] = force_older[i], force_before[i]
+        force_before[i], force[i] = force[i], extrapolated
+
+
+@inlined
+def _forget_forces(rows: Rows, fallen: FloatArray) -> None:
+    """Go back to before that."""
+    for i in range(len(fallen)):
+        rows.force[i], rows.force_before[i], rows.force_older[i] = rows.force_before[i], rows.force_older[i], fallen[i]
+
+
+@inlined
+def _turn(rows: Rows, spare: FloatArray) -> float:
+    """By how much the new rods have turned, rad: the eighth root of the sum of eighth powers.
+
+    The sum is folded in halves: one that runs from end to end does not run in vector registers.
+    """
+    n = len(rows.off)
+    for i in range(n):
+        x, y = rows.new_x[i] - rows.x[i + 1], rows.new_y[i] - rows.y[i + 1]
+        square = rows.inverse_square[i] * (x * x + y * y)
+        spare[i] = square * square * square * square
+    while n > 1:
+        rest = (n + 1) // 2
+        for i in range(n // 2):
+            spare[i] += spare[rest + i]
+        n = rest
+    turn: float = np.sqrt(np.sqrt(np.sqrt(spare[0])))
+    return turn
+
+
+@inlined
+def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: FloatArray) -> float:
+    """The length of the next step, s, with multipliers that close it; leaves the new rods. 0 where none are found."""
+    last, falling = steps[_LAST], rows.speed_y[0]
+    h: float = min(steps[_NEXT], longest)
+    again, followed, close = True, False, _CLOSE
+    for iteration in range(MOST_ITERATIONS):
+        between = 0.5 * (h + last)
+        rows.speed_y[0] = falling - between * chain.gravity
+        open_rods, rough = write_new_rods(chain, rows, h, h * between, close)
+        if open_rods == 0 and followed:
+            return h
+        if again or iteration >= _FRESH:
+            eliminate(chain, rows, h * between)
+            again = rough > 0
+        if rough == 0 and not followed:
+            share = _turn(rows, spare) / TURN
+            h /= np.hypot(h / longest, share)
+            followed, close = True, max(CLOSE, _CLOSE * share * share * share)
+        correct(rows)
+    rows.speed_y[0] = falling
+    return 0.0
+
+
+@inlined
+def _step(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArray) -> float:
+    """The length of the next step, s, that leaves the new rods; 0 where even the finest does not close."""
+    falling = rows.speed_y[0]
+    while steps[_PARTS] <= FINEST:
+        longest = dt / steps[_PARTS]
+        _extrapolate_forces(rows, room[8], steps[_LAST], steps[_BEFORE], steps[_OLDER])
+        h = _closes(chain, rows, steps, longest, room[9])
+        if h > 0.0:
+            most = _LONGEST_AT_REST if h > _AT_REST * longest else _LONGEST
+            if pulls_within(chain.couplings, rows.force, (most / h) ** 2):
+                return h
+            rows.speed_y[0] = falling
+        _forget_forces(rows, room[8])
+        steps[_PARTS] *= 2.0
+    return 0.0
+
+
+@inlined
+def _run(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArray, end: float) -> bool:
+    """Take steps as long as they end before `end`, s; False where one cannot be taken."""
+    while True:
+        falling, last = rows.speed_y[0], steps[_LAST]
+        h = _step(chain, rows, steps, dt, room)
+        if h == 0.0:
+            return False
+        if steps[_TIME] + h > end:
+            rows.speed_y[0] = falling
+            _forget_forces(rows, room[8])
+            return True
+        accept(rows, h)
+        steps[_NEXT] = h * min(max(h / last, 1.0 / _CHANGE), _CHANGE) if last > 0.0 else h
+        steps[_OLDER], steps[_BEFORE], steps[_LAST] = steps[_BEFORE], last, h
+        steps[_TIME] += h
+
+
+@compiled
+def _advance(
+    chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatArray, aside: FloatArray, dt: float, end: float
+) -> float:
+    """Run to before `end`, s, in steps of dt s at most, and leave the rods of then aside.
+
+    Returns the length of the step aside, s, or of the last one where none was needed; 0 where the run is stuck.
+    """
+    rows = rows_of(memory, room, len(chain.lengths))
+    prepare_rows(chain, rows)
+    if not _run(chain, rows, steps, dt, room, end):
+        return 0.0
+    copy_rows(memory, aside)
+    ahead, last = end - steps[_TIME], steps[:1].copy()
+    if ahead > _THERE * dt and take_steps(chain, aside, last, room, ahead, _ONE, np.inf, np.inf) == 0:
+        return 0.0
+    return float(last[0])
+
+
+def write_start(chain: Chain, state: State, dt: float) -> None:
+    """Before the first step, the rods and what `rattle` keeps of them, and a first guess of the step."""
+    if state.steps[_LAST] == 0.0:
+        rattle.write_start(chain, rattle.State(*state[:6]))
+        state.steps[_NEXT] = dt / np.hypot(1.0, dt * np.abs(state.v).max() / TURN)
+
+
+def adaptive_rattle(chain: Chain, state: State, first: int, dt: float, steps: int) -> int:
+    """Take steps as `methods.FixedStep` says, each in as many as the motion asks for."""
+    write_start(chain, state, dt)
+    memory, kept, taken = state.memory.copy(), state.steps.copy(), steps
+    last = _advance(chain, *state[3:], dt, (first + steps) * dt)
+    if last == 0.0:  # to the last output before it is stuck
+        taken = max(math.ceil(state.steps[_TIME] / dt) - 1 - first, 0)
+        state.memory[:], state.steps[:] = memory, kept
+        last = _advance(chain, *state[3:], dt, (first + taken) * dt) if taken > 0 else 0.0
+    if last > 0.0:
+        rattle.write_state(chain, rattle.State(*state[:3], state.aside, np.array([last]), state.room))
+    return taken
+
+
+add(
+    FixedStep(
+        "adaptive_rattle",
+        order=2,
+        note="RATTLE with reversible steps that follow the motion",
+        form=Form.RODS,
+        begin=begin,
+        advance=adaptive_rattle,
+        stuck=f"the chain moves too fast for {FINEST} parts of a step",
+        remedy="a smaller step might",
+        substeps=True,
+    )
+)
