@@ -60,11 +60,11 @@ class Walk:
     def steps(self, count: int) -> list[float]:
         """The lengths of the next steps, s."""
         kept, found = self.state.steps, list[float]()
-        while len(found) < count:
+        for _ in range(count):
             before = kept[module._TIME]
             assert module._advance(self.chain, *self.state[3:], self.dt, before + 1.5 * kept[module._NEXT]) > 0.0
-            if kept[module._TIME] > before:  # by one step: two would be longer
-                found.append(float(kept[module._LAST]))
+            assert kept[module._TIME] == before + kept[module._LAST]  # it took one
+            found.append(float(kept[module._LAST]))
         return found
 
     def turn_back(self) -> None:
@@ -77,18 +77,18 @@ class Walk:
 
 @pytest.mark.parametrize("scene", [random_chain(4, seed=4), chain(3, angle=1.5)])
 def test_the_way_back_takes_the_same_steps(scene: Scene) -> None:
-    """To a seventh of what they change from one to the next: the length is found in one round of Newton's method.
+    """To a thirtieth of what they change from one to the next: the length is found in one round of Newton's method.
 
     A step that followed the one before would be off by that change.
     """
     walk = Walk(scene, 0.02)
     start = walk.state.memory[:2].copy()
     there = np.array(walk.steps(60))
-    assert there.min() < 0.7 * there.max()
+    assert there.min() < 0.8 * there.max()
     walk.turn_back()
     back = np.array(walk.steps(59)[::-1])
-    assert np.abs(np.log(back / there[:-1])).max() < np.abs(np.diff(np.log(there))).max() / 7
-    np.testing.assert_allclose(walk.state.memory[:2], start, atol=1e-3 * scene.lengths.max())
+    assert np.abs(np.log(back / there[:-1])).max() < np.abs(np.diff(np.log(there))).max() / 30
+    np.testing.assert_allclose(walk.state.memory[:2], start, atol=1e-4 * scene.lengths.max())
 
 
 def test_a_step_turns_the_fastest_rod_by_what_it_may() -> None:

@@ -49,9 +49,10 @@ from pendbench.solvers.multipliers import (
 from pendbench.solvers.rattle import FINEST, accept, take_steps
 
 #: By how much a step turns the fastest rods, rad; and the largest h W of one that turns them so far, and of one of b.
-TURN, _LONGEST, _LONGEST_AT_REST = 0.15, 1.5, 0.5
+TURN, _LONGEST, _LONGEST_AT_REST = 0.2, 1.5, 1.0
 
 _CLOSE = 1e-6  # how far a rod may be from its length after such a step, relative to it; as the third power of less
+_ROUGH = 1e-2  # from where on the matrix of one iteration will not do for the next, and rods do not tell the step
 _FRESH = 4  # iterations with one matrix; where these are not enough, each has its own
 _CHANGE = 1.25  # of a step from one to the next, as a first guess
 _AT_REST = 0.9  # of b: longer steps are hardly limited by turns
@@ -135,13 +136,13 @@ def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: 
     for iteration in range(MOST_ITERATIONS):
         between = 0.5 * (h + last)
         rows.speed_y[0] = falling - between * chain.gravity
-        open_rods, rough = write_new_rods(chain, rows, h, h * between, close)
+        open_rods, rough = write_new_rods(chain, rows, h, h * between, close, _ROUGH)
         if open_rods == 0 and followed:
             return h
         if again or iteration >= _FRESH:
             eliminate(chain, rows, h * between)
             again = rough > 0
-        if rough == 0 and not followed:
+        if iteration > 0 and rough == 0 and not followed:
             share = _turn(rows, spare) / TURN
             h /= np.hypot(h / longest, share)
             followed, close = True, max(CLOSE, _CLOSE * share * share * share)

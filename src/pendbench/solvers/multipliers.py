@@ -84,13 +84,13 @@ def extrapolate_forces(rows: Rows) -> None:
 
 
 @inlined
-def write_new_rods(chain: Chain, rows: Rows, h: float, kick: float, most: float) -> tuple[int, int]:
-    """The rods after a step of h s, with k of `kick`, s^2; how many are off by more than `most`, and how many by far.
+def write_new_rods(chain: Chain, rows: Rows, h: float, kick: float, close: float, rough: float) -> tuple[int, int]:
+    """The rods after a step of h s, with k of `kick`, s^2; how many are not `close`, and how many are `rough`.
 
     Counted, since a loop that looks for the largest does not run in vector registers.
     """
     couplings, x, y, force, off = chain.couplings, rows.x, rows.y, rows.force, rows.off
-    open_rods, rough = 0, 0
+    open_rods, rough_rods = 0, 0
     for i in range(len(off)):
         inner, outer = kick * couplings[i], kick * couplings[i + 1]
         own, out, back = (inner + outer) * force[i + 1], outer * force[i + 2], inner * force[i]
@@ -98,9 +98,9 @@ def write_new_rods(chain: Chain, rows: Rows, h: float, kick: float, most: float)
         new_y = y[i + 1] + h * rows.speed_y[i] + own * y[i + 1] - out * y[i + 2] - back * y[i]
         rows.new_x[i], rows.new_y[i] = new_x, new_y
         off[i] = 0.5 - 0.5 * rows.inverse_square[i] * (new_x * new_x + new_y * new_y)
-        open_rods += not abs(off[i]) <= most
-        rough += not abs(off[i]) <= _ROUGH
-    return open_rods, rough
+        open_rods += not abs(off[i]) <= close
+        rough_rods += not abs(off[i]) <= rough
+    return open_rods, rough_rods
 
 
 @inlined
@@ -199,7 +199,7 @@ def closes(chain: Chain, rows: Rows, h: float, kick: float) -> bool:
     """
     again = True
     for _ in range(MOST_ITERATIONS):
-        open_rods, rough = write_new_rods(chain, rows, h, kick, CLOSE)
+        open_rods, rough = write_new_rods(chain, rows, h, kick, CLOSE, _ROUGH)
         if open_rods == 0:
             return True
         if again:
