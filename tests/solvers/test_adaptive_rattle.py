@@ -109,6 +109,25 @@ def test_whoever_looks_does_not_change_the_run() -> None:
     np.testing.assert_array_equal(often.state.q, once.state.q)
 
 
+#: A start and a step each with which Newton's method has closed a step, of the run or aside from it, on another motion.
+AMBIGUOUS = [
+    (chain(1, length=1.0, angle=0.23), 0.5, 20),
+    (chain(1, length=1.0, angle=2.98), 0.7, 20),
+    (chain(1, length=1.2765007, angle=-1.42531683, rate=-2.8197599), 1.22662, 20),
+    (chain(2, length=1.0, angle=2.98), 0.5, 20),
+    (chain(3, length=1.0, angle=[-0.35, 1.7, 0.61], rate=[1.6, -1.1, -1.1], mass=[0.49, 0.4, 3.86]), 0.034, 60),
+]
+
+
+@pytest.mark.parametrize(("scene", "dt", "count"), AMBIGUOUS)
+def test_no_step_closes_on_another_motion(scene: Scene, dt: float, count: int) -> None:
+    """The energy then changes by a fifth of its scale and more, at one output or for good."""
+    run = simulate(scene, "analytic", "adaptive_rattle", dt, dt * np.arange(count + 1))
+    assert run.status == "ok", run.reason
+    found = energy(scene, run.theta, run.omega)
+    assert np.abs(found - found[0]).max() < 0.1 * energy_scale(scene)
+
+
 def test_turns_are_counted_where_a_step_asked_for_holds_more_than_one() -> None:
     scene = chain(1, rate=100.0)
     times = 0.1 * np.arange(11)
@@ -119,8 +138,11 @@ def test_turns_are_counted_where_a_step_asked_for_holds_more_than_one() -> None:
     assert run.theta == pytest.approx(theta, abs=1.02 * 100.0 * TURN**2 / 6)
 
 
-def test_a_motion_too_fast_for_the_finest_parts_is_a_status() -> None:
-    scene = dataclasses.replace(rope(10), rates=np.linspace(-1e7, 1e7, 10))
+@pytest.mark.parametrize(
+    "scene",
+    [dataclasses.replace(rope(10), rates=np.linspace(-1e7, 1e7, 10)), chain(1, rate=1e6, gravity=None)],
+)
+def test_a_motion_too_fast_for_the_finest_parts_is_a_status(scene: Scene) -> None:
     run = AnalyticEngine().build(scene, "adaptive_rattle", 1 / 240)
     run.advance(3)
     status, reason = run.health()

@@ -12,8 +12,9 @@ would be taken back; each crack of a whip then costs energy, as it does where st
 Eighth powers, since the largest of the turns itself has a kink wherever another rod becomes the fastest.
 
 Tensions without turns, as in a rope that hangs at rest, ask for short steps as well. So b is the step that was asked
-for, cut into two, four, eight parts where h W is too large, with the bound W of `frame`, and, as there, not joined
-again.
+for, cut into two, four, eight parts where it decides and h W is too large, with the bound W of `frame`, or no step
+closes; and, as there, not joined again. Where turns decide and a step fails, it alone is begun again with half of what
+was tried.
 
 Where the motion is asked for between two steps, a step aside is taken from the one before. The run itself goes on as if
 nobody had looked.
@@ -25,7 +26,7 @@ Integration, VIII.3.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,24 +42,27 @@ from pendbench.solvers.multipliers import (
     Rows,
     correct,
     eliminate,
+    guess_forces,
     prepare_rows,
     pulls_within,
     rows_of,
+    turns_within,
     write_new_rods,
 )
 from pendbench.solvers.rattle import FINEST, accept, take_steps
 
-#: By how much a step turns the fastest rods, rad; and the largest h W of one that turns them so far, and of one of b.
-TURN, _LONGEST, _LONGEST_AT_REST = 0.2, 1.5, 1.0
+TURN = 0.2  #: by how much a step turns the fastest rods, rad
+
+_LONGEST, _LONGEST_AT_REST = 1.5, 1.0  # the largest h W where turns decide, and where b does
+_FURTHEST = 0.3  # rad: a step that turned a rod further is not the one that was asked for
 
 _CLOSE = 1e-6  # how far a rod may be from its length after such a step, relative to it; as the third power of less
 _ROUGH = 1e-2  # from where on the matrix of one iteration will not do for the next, and rods do not tell the step
 _FRESH = 4  # iterations with one matrix; where these are not enough, each has its own
 _CHANGE = 1.25  # of a step from one to the next, as a first guess
+_GROWTH = 1.2  # of a step over that: where rods turn back, their turns say nothing; and what is far less is begun again
 _AT_REST = 0.9  # of b: longer steps are hardly limited by turns
-_THERE = 1e-6  # in steps: so near to the output no step aside is taken, since the mean speed in it would be rounding
-
-_ONE: Any = np.int64(1)  # of a 1 numba makes a type of its own, and a second kernel
+_THERE = 1e-5  # of a step: so near to the output no step aside is taken, since the mean speed in it would be rounding
 
 #: What is kept in `State.steps`: the length of the last step, s, and of the two before, 0 where there is none; a first
 #: guess of the next; how far the run has come, s; and into how many parts b is cut.
@@ -144,7 +148,10 @@ def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: 
             again = rough > 0
         if iteration > 0 and rough == 0 and not followed:
             share = _turn(rows, spare) / TURN
-            h /= np.hypot(h / longest, share)
+            change = 1.0 / np.hypot(h / longest, share)
+            if change * _GROWTH < 1.0:
+                break
+            h *= min(change, _GROWTH)
             followed, close = True, max(CLOSE, _CLOSE * share * share * share)
         correct(rows)
     rows.speed_y[0] = falling
@@ -153,25 +160,43 @@ def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: 
 
 @inlined
 def _step(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArray) -> float:
-    """The length of the next step, s, that leaves the new rods; 0 where even the finest does not close."""
-    falling = rows.speed_y[0]
-    while steps[_PARTS] <= FINEST:
+    """The length of the next step, s, that leaves the new rods; 0 where even the finest does not close.
+
+    Multipliers can close a step on another motion than the one they come from, that turns rods by far more than asked.
+    """
+    falling, finest = rows.speed_y[0], dt / FINEST
+    while steps[_NEXT] >= finest:
         longest = dt / steps[_PARTS]
         _extrapolate_forces(rows, room[8], steps[_LAST], steps[_BEFORE], steps[_OLDER])
         h = _closes(chain, rows, steps, longest, room[9])
-        if h > 0.0:
-            most = _LONGEST_AT_REST if h > _AT_REST * longest else _LONGEST
+        tried = h if h > 0.0 else min(steps[_NEXT], longest)
+        rests = tried > _AT_REST * longest
+        if h >= finest and turns_within(rows, _FURTHEST):
+            most = _LONGEST_AT_REST if rests else _LONGEST
             if pulls_within(chain.couplings, rows.force, (most / h) ** 2):
                 return h
-            rows.speed_y[0] = falling
+        rows.speed_y[0] = falling
         _forget_forces(rows, room[8])
-        steps[_PARTS] *= 2.0
+        steps[_PARTS] *= 2.0 if rests else 1.0
+        steps[_NEXT] = 0.5 * min(steps[_NEXT], tried)
     return 0.0
 
 
 @inlined
-def _run(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArray, end: float) -> bool:
-    """Take steps as long as they end before `end`, s; False where one cannot be taken."""
+def _run(
+    chain: Chain,
+    memory: FloatArray,
+    rows: Rows,
+    steps: FloatArray,
+    dt: float,
+    room: FloatArray,
+    aside: FloatArray,
+    end: float,
+) -> bool:
+    """Take steps as long as they end before `end`, s; False where one cannot be taken.
+
+    Leaves the rods aside, with the multipliers of the step that would have been the next.
+    """
     while True:
         falling, last = rows.speed_y[0], steps[_LAST]
         h = _step(chain, rows, steps, dt, room)
@@ -179,12 +204,29 @@ def _run(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArra
             return False
         if steps[_TIME] + h > end:
             rows.speed_y[0] = falling
+            copy_rows(memory, aside)
             _forget_forces(rows, room[8])
             return True
         accept(rows, h)
         steps[_NEXT] = h * min(max(h / last, 1.0 / _CHANGE), _CHANGE) if last > 0.0 else h
         steps[_OLDER], steps[_BEFORE], steps[_LAST] = steps[_BEFORE], last, h
         steps[_TIME] += h
+
+
+@inlined
+def _look(chain: Chain, memory: FloatArray, aside: FloatArray, room: FloatArray, last: float, ahead: float) -> float:
+    """Take the rods aside `ahead` s further, and return the length of the last step; 0 where that cannot be done."""
+    if ahead <= _THERE * last:
+        return last
+    rows, steps, parts = rows_of(aside, room, len(chain.lengths)), np.zeros(1), 1
+    while parts <= FINEST:
+        steps[0] = last
+        guess_forces(rows, rows.force)
+        if take_steps(chain, aside, steps, room, ahead / parts, parts, _FURTHEST, np.inf) == parts:
+            return float(steps[0])
+        copy_rows(memory, aside)
+        parts *= 2
+    return 0.0
 
 
 @compiled
@@ -197,18 +239,14 @@ def _advance(
     """
     rows = rows_of(memory, room, len(chain.lengths))
     prepare_rows(chain, rows)
-    if not _run(chain, rows, steps, dt, room, end):
+    if not _run(chain, memory, rows, steps, dt, room, aside, end):
         return 0.0
-    copy_rows(memory, aside)
-    ahead, last = end - steps[_TIME], steps[:1].copy()
-    if ahead > _THERE * dt and take_steps(chain, aside, last, room, ahead, _ONE, np.inf, np.inf) == 0:
-        return 0.0
-    return float(last[0])
+    return _look(chain, memory, aside, room, steps[_LAST], end - steps[_TIME])
 
 
 def write_start(chain: Chain, state: State, dt: float) -> None:
     """Before the first step, the rods and what `rattle` keeps of them, and a first guess of the step."""
-    if state.steps[_LAST] == 0.0:
+    if state.steps[_NEXT] == 0.0:
         rattle.write_start(chain, rattle.State(*state[:6]))
         state.steps[_NEXT] = dt / np.hypot(1.0, dt * np.abs(state.v).max() / TURN)
 
@@ -217,13 +255,15 @@ def adaptive_rattle(chain: Chain, state: State, first: int, dt: float, steps: in
     """Take steps as `methods.FixedStep` says, each in as many as the motion asks for."""
     write_start(chain, state, dt)
     memory, kept, taken = state.memory.copy(), state.steps.copy(), steps
-    last = _advance(chain, *state[3:], dt, (first + steps) * dt)
+    last = _advance(chain, *state[3:], dt, (first + taken) * dt)
     if last == 0.0:  # to the last output before it is stuck
         taken = max(math.ceil(state.steps[_TIME] / dt) - 1 - first, 0)
         state.memory[:], state.steps[:] = memory, kept
         last = _advance(chain, *state[3:], dt, (first + taken) * dt) if taken > 0 else 0.0
-    if last > 0.0:
-        rattle.write_state(chain, rattle.State(*state[:3], state.aside, np.array([last]), state.room))
+    if last == 0.0:
+        state.memory[:], state.steps[:] = memory, kept
+        return 0
+    rattle.write_state(chain, rattle.State(*state[:3], state.aside, np.array([last]), state.room))
     return taken
 
 
