@@ -56,7 +56,7 @@ TURN = 0.2  #: by how much a step turns the fastest rods, rad
 _LONGEST, _LONGEST_AT_REST = 1.5, 1.0  # the largest h W where turns decide, and where b does
 _FURTHEST = 0.3  # rad: a step that turned a rod further is not the one that was asked for
 
-_CLOSE = 1e-6  # how far a rod may be from its length after such a step, relative to it; as the third power of less
+_CLOSE = 1e-6  # how far a rod may be from its length after such a step, relative to it; less after less, by the cube
 _ROUGH = 1e-2  # from where on the matrix of one iteration will not do for the next, and rods do not tell the step
 _FRESH = 4  # iterations with one matrix; where these are not enough, each has its own
 _CHANGE = 1.25  # of a step from one to the next, as a first guess
