@@ -40,16 +40,16 @@ from pendbench.solvers.multipliers import (
     CLOSE,
     MOST_ITERATIONS,
     Rows,
+    closes,
     correct,
     eliminate,
-    guess_forces,
     prepare_rows,
     pulls_within,
     rows_of,
     turns_within,
     write_new_rods,
 )
-from pendbench.solvers.rattle import FINEST, accept, take_steps
+from pendbench.solvers.rattle import FINEST, accept
 
 TURN = 0.2  #: by how much a step turns the fastest rods, rad
 
@@ -214,16 +214,39 @@ def _run(
 
 
 @inlined
+def _accept_by_kick(chain: Chain, rows: Rows, room: FloatArray, h: float, between: float) -> None:
+    """Go on from the new rods; their speeds by what changed them, since over a short step differences are rounding."""
+    couplings, force, x, y, new_speed_x, new_speed_y = chain.couplings, rows.force, rows.x, rows.y, room[8], room[9]
+    for i in range(len(rows.off)):
+        inner, outer = between * couplings[i], between * couplings[i + 1]
+        own, out, back = (inner + outer) * force[i + 1], outer * force[i + 2], inner * force[i]
+        new_speed_x[i] = rows.speed_x[i] + own * x[i + 1] - out * x[i + 2] - back * x[i]
+        new_speed_y[i] = rows.speed_y[i] + own * y[i + 1] - out * y[i + 2] - back * y[i]
+    accept(rows, h)
+    for i in range(len(rows.off)):
+        rows.speed_x[i], rows.speed_y[i] = new_speed_x[i], new_speed_y[i]
+
+
+@inlined
 def _look(chain: Chain, memory: FloatArray, aside: FloatArray, room: FloatArray, last: float, ahead: float) -> float:
-    """Take the rods aside `ahead` s further, and return the length of the last step; 0 where that cannot be done."""
+    """Take the rods aside `ahead` s further, and return the length of the last step; 0 where that cannot be done.
+
+    What is left of the rods' lengths becomes speed over the step, which can be short: so a correction at least.
+    """
     if ahead <= _THERE * last:
         return last
-    rows, steps, parts = rows_of(aside, room, len(chain.lengths)), np.zeros(1), 1
+    rows, parts = rows_of(aside, room, len(chain.lengths)), 1
     while parts <= FINEST:
-        steps[0] = last
-        guess_forces(rows, rows.force)
-        if take_steps(chain, aside, steps, room, ahead / parts, parts, _FURTHEST, np.inf) == parts:
-            return float(steps[0])
+        h, before, taken = ahead / parts, last, 0
+        while taken < parts:
+            between = 0.5 * (h + before)
+            rows.speed_y[0] -= between * chain.gravity
+            if not closes(chain, rows, h, h * between, 1) or not turns_within(rows, _FURTHEST):
+                break
+            _accept_by_kick(chain, rows, room, h, between)
+            before, taken = h, taken + 1
+        if taken == parts:
+            return h
         copy_rows(memory, aside)
         parts *= 2
     return 0.0

@@ -192,15 +192,15 @@ def correct(rows: Rows) -> None:
 
 
 @inlined
-def closes(chain: Chain, rows: Rows, h: float, kick: float) -> bool:
-    """Whether multipliers are found that close a step of h s; leaves the new rods.
+def closes(chain: Chain, rows: Rows, h: float, kick: float, least: int = 0) -> bool:
+    """Whether multipliers are found that close a step of h s, in so many iterations at least; leaves the new rods.
 
     Where no rod is far off, the matrix changes little from one iteration to the next and is not eliminated again.
     """
     again = True
-    for _ in range(MOST_ITERATIONS):
+    for iteration in range(MOST_ITERATIONS):
         open_rods, rough = write_new_rods(chain, rows, h, kick, CLOSE, _ROUGH)
-        if open_rods == 0:
+        if open_rods == 0 and iteration >= least:
             return True
         if again:
             eliminate(chain, rows, kick)
