@@ -9,29 +9,21 @@ the energy was off at most, over its scale.
 
 from __future__ import annotations
 
-import math
 import sys
 from typing import Any, Final
 
-import numpy as np
+from long_chains import END, rope
 
 from pendbench.engines.recording import simulate
 from pendbench.engines.registry import engine
 from pendbench.measures.clock import timed
 from pendbench.physics.energy import energy, energy_scale
-from pendbench.scene.scene import Effects, Scene
+from pendbench.scene.scene import Scene
 
 SIZES: Final = (20, 50, 100, 200, 500)
 METHODS: Final = ("rattle", "frame", "adaptive_rattle")
 STEPS: Final = 12  # between two looks
 DT: Final = 1 / (40 * STEPS)
-END: Final = 10  # s
-
-
-def rope(n: int) -> Scene:
-    """The chain."""
-    each = np.full(n, 1.0 / n)
-    return Scene("rope", "", float(END), each, each, np.full(n, 0.5 * math.pi), np.zeros(n), Effects(gravity=9.81))
 
 
 def measured(scene: Scene, method: str) -> str:

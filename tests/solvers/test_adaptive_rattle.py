@@ -12,19 +12,14 @@ from pendbench.engines.analytic.adapter import AnalyticEngine
 from pendbench.engines.recording import simulate
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.exact import single_pendulum
-from pendbench.scene.scene import Scene
+from pendbench.scene.scene import Scene, load_scene
 from pendbench.solvers import adaptive_rattle as module
 from pendbench.solvers.adaptive_rattle import TURN, adaptive_rattle, begin, write_start
 from pendbench.solvers.closing import chain_of
 from pendbench.solvers.rattle import FINEST
-from support.scenes import chain, random_chain
+from support.scenes import chain, random_chain, rope
 
 DT = 1 / 480
-
-
-def rope(n: int, **start) -> Scene:
-    """One metre and one kilogram in n links."""
-    return chain(n, mass=1 / n, **start)
 
 
 def strays(scene: Scene, method: str, seconds: float) -> np.ndarray:
@@ -161,10 +156,21 @@ def test_a_motion_too_fast_for_the_finest_parts_is_a_status(scene: Scene) -> Non
     assert run.health() == (status, reason)
 
 
-def test_what_is_stuck_is_left_at_the_last_output_before() -> None:
-    walk, whole = Walk(random_chain(3, seed=3), 1e-3), Walk(random_chain(3, seed=3), 1e-3)
+def test_what_is_stuck_on_the_way_stops_at_the_last_output_before() -> None:
+    scene = load_scene("graded_up")
+    whole, single = Walk(scene, 0.05), Walk(scene, 0.05)
+    taken = adaptive_rattle(whole.chain, whole.state, 0, 0.05, 40)
+    assert 1 < taken < 40
+    for k in range(taken):
+        assert adaptive_rattle(single.chain, single.state, k, 0.05, 1) == 1
+    assert adaptive_rattle(single.chain, single.state, taken, 0.05, 1) == 0
+    np.testing.assert_array_equal(whole.state.q, single.state.q)
+    np.testing.assert_array_equal(whole.state.v, single.state.v)
+
+
+def test_what_cannot_begin_stays_as_it_was() -> None:
+    walk = Walk(random_chain(3, seed=3), 1e-3)
     assert adaptive_rattle(walk.chain, walk.state, 0, 1e-3, 10) == 10
-    assert adaptive_rattle(whole.chain, whole.state, 0, 1e-3, 10) == 10
     walk.state.memory[5] *= 1e9
     kept = [part.copy() for part in walk.state[:5]]
     assert adaptive_rattle(walk.chain, walk.state, 10, 1e-3, 10) == 0

@@ -18,7 +18,7 @@ from pendbench.solvers.frame import LONGEST, MOST_SUBSTEPS, take_frames
 from pendbench.solvers.multipliers import Rows, pulls_within, rows_of
 from pendbench.solvers.rattle import begin, rattle
 from support.kernels import called
-from support.scenes import chain, random_chain
+from support.scenes import chain, random_chain, rope
 
 FRAME = 1 / 240
 
@@ -39,11 +39,6 @@ class Run:
 
     def rows(self) -> Rows:
         return called(rows_of)(self.state.memory, self.state.room, len(self.chain.lengths))
-
-
-def rope(n: int, **start) -> Scene:
-    """One metre and one kilogram in n links."""
-    return chain(n, mass=1 / n, **start)
 
 
 def strays(scene: Scene, seconds: float) -> np.ndarray:

@@ -15,16 +15,11 @@ from pendbench.physics.geometry import positions, velocities
 from pendbench.scene.scene import Scene
 from pendbench.solvers import closing, implicit
 from pendbench.solvers.methods import fixed_step_methods
-from support.scenes import chain, random_chain
+from support.scenes import chain, random_chain, rope
 
 METHODS = ["implicit_euler", "bdf2", "energy_momentum"]
 DAMPED = METHODS[:2]
 FRAME = 1 / 240
-
-
-def rope(n: int, **start) -> Scene:
-    """One metre and one kilogram in n links, released horizontally."""
-    return chain(n, mass=1 / n, **start)
 
 
 class Rods:

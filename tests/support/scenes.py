@@ -37,6 +37,11 @@ def chain(
     )
 
 
+def rope(n: int, **start) -> Scene:
+    """One metre and one kilogram in n links."""
+    return chain(n, mass=1 / n, **start)
+
+
 def random_chain(n: int, seed: int, spread: float = 1.0, gravity: float | None = 9.81) -> Scene:
     """A chain of n unlike links, in disorder and moving; `spread` (rad, rad/s) is how much."""
     rng = np.random.default_rng(seed)

@@ -44,6 +44,7 @@ from pendbench.solvers.multipliers import (
     correct,
     eliminate,
     prepare_rows,
+    pulls,
     pulls_within,
     rows_of,
     turns_within,
@@ -184,19 +185,14 @@ def _step(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArr
 
 @inlined
 def _run(
-    chain: Chain,
-    memory: FloatArray,
-    rows: Rows,
-    steps: FloatArray,
-    dt: float,
-    room: FloatArray,
-    aside: FloatArray,
-    end: float,
+    chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatArray, aside: FloatArray, dt: float, end: float
 ) -> bool:
     """Take steps as long as they end before `end`, s; False where one cannot be taken.
 
     Leaves the rods aside, with the multipliers of the step that would have been the next.
     """
+    rows = rows_of(memory, room, len(chain.lengths))
+    prepare_rows(chain, rows)
     while True:
         falling, last = rows.speed_y[0], steps[_LAST]
         h = _step(chain, rows, steps, dt, room)
@@ -218,8 +214,7 @@ def _accept_by_kick(chain: Chain, rows: Rows, room: FloatArray, h: float, betwee
     """Go on from the new rods; their speeds by what changed them, since over a short step differences are rounding."""
     couplings, force, x, y, new_speed_x, new_speed_y = chain.couplings, rows.force, rows.x, rows.y, room[8], room[9]
     for i in range(len(rows.off)):
-        inner, outer = between * couplings[i], between * couplings[i + 1]
-        own, out, back = (inner + outer) * force[i + 1], outer * force[i + 2], inner * force[i]
+        own, out, back = pulls(couplings, force, i, between)
         new_speed_x[i] = rows.speed_x[i] + own * x[i + 1] - out * x[i + 2] - back * x[i]
         new_speed_y[i] = rows.speed_y[i] + own * y[i + 1] - out * y[i + 2] - back * y[i]
     accept(rows, h)
@@ -260,9 +255,7 @@ def _advance(
 
     Returns the length of the step aside, s, or of the last one where none was needed; 0 where the run is stuck.
     """
-    rows = rows_of(memory, room, len(chain.lengths))
-    prepare_rows(chain, rows)
-    if not _run(chain, memory, rows, steps, dt, room, aside, end):
+    if not _run(chain, memory, steps, room, aside, dt, end):
         return 0.0
     return _look(chain, memory, aside, room, steps[_LAST], end - steps[_TIME])
 
@@ -298,8 +291,8 @@ add(
         form=Form.RODS,
         begin=begin,
         advance=adaptive_rattle,
-        stuck=f"the chain moves too fast for {FINEST} parts of a step",
-        remedy="a smaller step might",
+        stuck=rattle.STUCK,
+        remedy=rattle.REMEDY,
         substeps=True,
     )
 )

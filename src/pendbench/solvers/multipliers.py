@@ -84,6 +84,16 @@ def extrapolate_forces(rows: Rows) -> None:
 
 
 @inlined
+def pulls(couplings: FloatArray, force: FloatArray, i: int, kick: float) -> tuple[float, float, float]:
+    """By how much a kick, s^2 or s, along rod i's own direction, the next one's and the last one's changes rod i.
+
+    Of the first is added, the others are taken away; s^2 changes the rod, s its speed.
+    """
+    inner, outer = kick * couplings[i], kick * couplings[i + 1]
+    return (inner + outer) * force[i + 1], outer * force[i + 2], inner * force[i]
+
+
+@inlined
 def write_new_rods(chain: Chain, rows: Rows, h: float, kick: float, close: float, rough: float) -> tuple[int, int]:
     """The rods after a step of h s, with k of `kick`, s^2; how many are not `close`, and how many are `rough`.
 
@@ -92,8 +102,7 @@ def write_new_rods(chain: Chain, rows: Rows, h: float, kick: float, close: float
     couplings, x, y, force, off = chain.couplings, rows.x, rows.y, rows.force, rows.off
     open_rods, rough_rods = 0, 0
     for i in range(len(off)):
-        inner, outer = kick * couplings[i], kick * couplings[i + 1]
-        own, out, back = (inner + outer) * force[i + 1], outer * force[i + 2], inner * force[i]
+        own, out, back = pulls(couplings, force, i, kick)
         new_x = x[i + 1] + h * rows.speed_x[i] + own * x[i + 1] - out * x[i + 2] - back * x[i]
         new_y = y[i + 1] + h * rows.speed_y[i] + own * y[i + 1] - out * y[i + 2] - back * y[i]
         rows.new_x[i], rows.new_y[i] = new_x, new_y

@@ -47,6 +47,9 @@ from pendbench.solvers.projection import across, solve_rods
 #: A step is cut into so many parts at most.
 FINEST = 16384
 
+#: What to say where that is not enough, and what would help.
+STUCK, REMEDY = f"the chain moves too fast for {FINEST} parts of a step", "a smaller step might"
+
 # A part is halved where h W, or a rod's turn, rad, is above the first; twice it is tried where at the end of so many
 # steps in a row both were below the second, and each time of as many more.
 _LONGEST, _LONGEST_CALM = 1.0, 0.4
@@ -226,8 +229,8 @@ add(
         form=Form.RODS,
         begin=begin,
         advance=rattle,
-        stuck=f"the chain moves too fast for {FINEST} parts of a step",
-        remedy="a smaller step might",
+        stuck=STUCK,
+        remedy=REMEDY,
         substeps=True,
     )
 )
