@@ -16,7 +16,7 @@ from pendbench.scene.scene import Scene
 from pendbench.solvers.closing import chain_of
 from pendbench.solvers.frame import LONGEST, MOST_SUBSTEPS, take_frames
 from pendbench.solvers.multipliers import Rows, pulls_within, rows_of
-from pendbench.solvers.rattle import begin, rattle
+from pendbench.solvers.rattle import FINEST, begin, rattle
 from support.kernels import called
 from support.scenes import chain, random_chain, rope
 
@@ -161,13 +161,17 @@ def test_turns_are_counted_where_a_frame_holds_more_than_one() -> None:
     assert run.theta == pytest.approx(theta, abs=1.0)
 
 
-def test_a_frame_that_asks_for_too_many_steps_is_a_status() -> None:
+@pytest.mark.parametrize(
+    ("method", "most"),
+    [("frame", f"{MOST_SUBSTEPS} steps"), ("rattle", f"{FINEST} parts"), ("adaptive_rattle", f"{FINEST} parts")],
+)
+def test_a_motion_that_asks_for_too_many_steps_is_a_status(method: str, most: str) -> None:
     scene = dataclasses.replace(rope(10), rates=np.linspace(-1e7, 1e7, 10))
-    run = AnalyticEngine().build(scene, "frame", FRAME)
+    run = AnalyticEngine().build(scene, method, FRAME)
     run.advance(3)
     status, reason = run.health()
     assert status == "not converged"
-    assert f"{MOST_SUBSTEPS} steps" in reason
+    assert most in reason
     np.testing.assert_array_equal(run.state().theta, scene.angles)  # it stays where it was well
     run.advance(1)
     assert run.health() == (status, reason)
