@@ -55,6 +55,18 @@ def test_jobs_run_in_other_processes(pool):
     assert {outcome.value[1] for outcome in found.values()} == {os.getpid()}
 
 
+def test_arithmetic_takes_one_thread_unless_the_user_wants_more(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    monkeypatch.setenv("MKL_NUM_THREADS", "2")
+    with LocalPool(1) as pool:
+        (outcome,) = outcomes(pool, job(does.threads_of_arithmetic)).values()
+        assert (os.environ["OPENBLAS_NUM_THREADS"], os.environ["MKL_NUM_THREADS"]) == ("1", "2")
+    told, beside = outcome.value
+    assert told == "1"
+    assert beside < 0.2  # 0.5 with two threads
+    assert "OPENBLAS_NUM_THREADS" not in os.environ
+
+
 def test_as_many_run_at_once_as_there_are_workers(pool, tmp_path):
     # Each waits for the other: run one after the other, both would time out.
     found = outcomes(pool, *(job(does.meet, str(tmp_path), key, 1, key=key) for key in "ab"))

@@ -28,6 +28,16 @@ def process() -> tuple[int, int]:
     return os.getpid(), os.getppid()
 
 
+def threads_of_arithmetic() -> tuple[str | None, float]:
+    """What libraries are told, and what part of a product's processor time others than the thread that asked took."""
+    square = np.ones((800, 800))
+    whole, own = time.process_time(), time.thread_time()
+    for _ in range(5):
+        square = square @ square / 800
+    whole, own = time.process_time() - whole, time.thread_time() - own
+    return os.environ.get("OPENBLAS_NUM_THREADS"), 1.0 - own / whole
+
+
 def fail() -> None:
     raise ValueError("first line\nsecond line")
 

@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from pathlib import Path
 from types import FrameType
+from typing import Final
 
 
 def processors() -> int:
@@ -96,6 +97,26 @@ def deaf_to_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+#: What libraries ask, as they are loaded, for how many threads to do their arithmetic in.
+THREAD_VARIABLES: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Processes that are started in this block do their arithmetic in one thread, unless the user wants it otherwise.
+
+    More would take the processors of those beside them, and a library's idle threads wait by spinning: that would count
+    as processor time of whatever is timed meanwhile.
+    """
+    unset = [name for name in THREAD_VARIABLES if name not in os.environ]
+    os.environ.update(dict.fromkeys(unset, "1"))
+    try:
+        yield
+    finally:
+        for name in unset:
+            os.environ.pop(name, None)
 
 
 def processor() -> str:

@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from multiprocessing.context import SpawnContext
 from types import TracebackType
@@ -24,7 +25,7 @@ from typing import Any, Final, Protocol, Self
 
 from pendbench.base.errors import InputError, describe
 from pendbench.base.faults import Fault
-from pendbench.base.processes import deaf_to_interrupts, refuse_without_guard
+from pendbench.base.processes import deaf_to_interrupts, one_thread_each, refuse_without_guard
 from pendbench.execution import limits
 from pendbench.execution.limits import GB, held
 
@@ -97,13 +98,14 @@ class LocalPool:
     def __init__(self, workers: int) -> None:
         self.workers = workers
         self._pool: Any = None
-        self._starting = _Starting()
+        self._starting, self._threads = _Starting(), ExitStack()
 
     def __enter__(self) -> Self:
         from pebble import CONSTS, ProcessPool
 
         refuse_without_guard()
         CONSTS.term_timeout = _STOPPING_S
+        self._threads.enter_context(one_thread_each())
         self._pool = ProcessPool(max_workers=self.workers, context=self._starting, initializer=_begin)
         with deaf_to_interrupts():
             assert self._pool.active  # asking starts it
@@ -116,6 +118,7 @@ class LocalPool:
             _share_stopping_time(self.workers)
             self._pool.stop()
         self._pool.join()
+        self._threads.close()
         self._starting.locks.clear()
 
     def run(self, jobs: Iterable[Job], *, alone: bool = False) -> Iterator[Outcome]:

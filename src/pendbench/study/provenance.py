@@ -8,13 +8,12 @@ from importlib import metadata
 from typing import Any
 
 from pendbench import __version__
-from pendbench.base.processes import processor
+from pendbench.base.processes import THREAD_VARIABLES, processor
 from pendbench.base.source import source_digest
 from pendbench.study.ask import version
 from pendbench.study.plan import Plan
 
 _LIBRARIES = ("numpy", "scipy", "numba", "pandas")
-_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def provenance(plan: Plan, workers: int) -> dict[str, Any]:
@@ -32,7 +31,7 @@ def provenance(plan: Plan, workers: int) -> dict[str, Any]:
         "logical processors": os.cpu_count(),
         "worker processes": workers,
         "threads per engine": 1,
-        **{name: os.environ.get(name, "not set") for name in _THREAD_VARIABLES},
+        **{name: os.environ.get(name, "1") for name in THREAD_VARIABLES},  # of the worker processes
         "seed": getattr(plan.options, "seed", None),
         "study": plan.name,
         "kind": plan.options.kind,
