@@ -1,6 +1,6 @@
 """Which method moves a long chain well, at the step of a picture, and what it costs. By hand:
 
-    python benchmarks/long_chains.py [LINKS ...]
+    OPENBLAS_NUM_THREADS=1 python benchmarks/long_chains.py [LINKS ...]
 
 One metre and one kilogram in so many links, released horizontally, for 10 s or until stepping took 20 s of processor
 time. Each row: what a simulated second costs, what becomes of the energy, and how far the coarse motion is off in the
@@ -40,7 +40,7 @@ MOST: Final = 20.0  # s of processor time
 SWING: Final = 1.0  # s, in which the rope turns
 ACCURATE: Final = 1000  # links, up to which accurate steps are cheap
 TOLERANCE: Final = 5e-4  # of the adaptive method, that of the study `scaling`
-FINER: Final = 4
+FINER: Final = 8
 
 
 def rope(n: int) -> Scene:

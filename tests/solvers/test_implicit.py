@@ -12,7 +12,7 @@ from pendbench.engines.analytic.adapter import AnalyticEngine
 from pendbench.engines.recording import simulate
 from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import positions, velocities
-from pendbench.scene.scene import Scene
+from pendbench.scene.scene import Effects, Scene
 from pendbench.solvers import closing, implicit
 from pendbench.solvers.methods import fixed_step_methods
 from support.scenes import chain, random_chain, rope
@@ -345,3 +345,49 @@ def test_a_chain_at_rest_is_not_cut_for_the_energy_of_its_rounding(scene: Scene,
 def test_the_finest_part_of_a_step_is_taken_whatever_it_gains(monkeypatch) -> None:
     monkeypatch.setattr(implicit, "MOST_RISE", -1.0)
     assert Rods(rope(5), "implicit_euler").steps(FRAME, 2) == 2
+
+
+@pytest.mark.parametrize("method", ["bdf2", "energy_momentum"])
+def test_a_step_begins_with_the_cubic_through_the_last_angles(method: str) -> None:
+    """What it has to find falls with the fourth power of the step."""
+    scene, off = chain(3, angle=[0.3, 0.5, 0.4]), []
+    for dt in (4e-3, 2e-3):
+        its = Rods(scene, method)
+        its.steps(dt, round(0.2 / dt))
+        rods_before = its.state.q.copy()
+        implicit.propose(its.chain, its.state, implicit.BDF2, dt, implicit.CHANGING)
+        guess = its.state.room.rows[closing.ANGLE, :3].copy()
+        its.steps(dt, 1)
+        off.append(np.abs(guess - its.state.q).max() / np.abs(its.state.q - rods_before).max())
+    assert 6.0 < off[0] / off[1] < 12.0  # over the step's own turn, which falls with the first
+
+
+def parts_tried(monkeypatch, scene: Scene, dt: float, steps: int, before: float = 0.0) -> list[int]:
+    """Into how many parts steps of bdf2 are cut. before: 1 where a descent came before."""
+    tried = []
+    step = implicit._Run.step
+    with monkeypatch.context() as patched:
+        patched.setattr(implicit._Run, "step", lambda run, h, parts: tried.append(parts) or step(run, h, parts))
+        its = Rods(scene, "bdf2")
+        its.state.steps[5] = before
+        assert its.steps(dt, steps) == steps
+    return tried
+
+
+def test_a_step_that_misses_is_cut_less_once_one_took_a_descent(monkeypatch) -> None:
+    monkeypatch.setattr(implicit, "FAR_OFF", 0.0)
+    monkeypatch.setattr(implicit, "MOST_RISE", 1.0)
+    scene = chain(3, angle=[0.3, 0.5, 0.4])
+    assert max(parts_tried(monkeypatch, scene, 4e-3, 5)) == 8
+    assert max(parts_tried(monkeypatch, scene, 4e-3, 5, before=1.0)) == 2
+
+
+def test_what_a_step_may_miss_by_knows_no_units(monkeypatch) -> None:
+    """A chain 100 times as long that falls 100 times as fast, and one that does all ten times as slowly."""
+    base = rope(20)
+    longer = dataclasses.replace(base, lengths=100.0 * base.lengths, effects=Effects(gravity=981.0))
+    slower = dataclasses.replace(base, effects=Effects(gravity=0.0981))
+    parts = parts_tried(monkeypatch, base, 0.01, 60)
+    assert len(parts) > 60  # some were cut
+    assert parts_tried(monkeypatch, longer, 0.01, 60) == parts
+    assert parts_tried(monkeypatch, slower, 0.1, 60) == parts

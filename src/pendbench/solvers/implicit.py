@@ -11,7 +11,7 @@ angles and pulls that close the chain (`closing`):
   the plane is that at the start, to what Newton's method leaves.
 
 A step that does not close is cut in two, and so is one of order 1 that raises the energy, and one of `bdf2` that misses
-what the motion before suggests by more than `FAR_OFF` of the chain; after one that does, twice the step is tried. Parts
+what the motion before suggests (`FAR_OFF`); after one that does well, twice the step is tried. Parts
 of order 1 are not cut for ever: they always have a solution, and a descent finds it (`closing.descend`) unless masses
 differ by more than some eight decades.
 Velocities of rods between two steps have a part along them, of the size of the method's error; rates are those of the
@@ -26,6 +26,8 @@ from __future__ import annotations
 
 import math
 from typing import Any
+
+import numpy as np
 
 from pendbench.base.arrays import FloatArray
 from pendbench.solvers.closing import Chain, close, descend
@@ -50,23 +52,26 @@ from pendbench.solvers.rods import (
     write_rates,
 )
 
-#: A step is cut into so many parts at most where it closes, but misses.
-MOST_FOR_A_MISS = 4
+#: A step is cut into so many parts at most where it closes, but misses: before the first descent, and after it. From
+#: there on the motion cannot be followed, and a sharper crack is only harder to close.
+MOST_FOR_A_MISS = (8, 2)
+
+#: After a step that misses by less than this part of what it may, twice the step is tried: that misses by four times.
+LONGER = 0.2
 
 #: Cutting pays where it makes a miss smaller by this factor at least. It does not where a whip cracks.
 PAYS = 0.6
 
-#: How far, in lengths of the chain, a step of `bdf2` may take a point from where the motion before would.
-FAR_OFF = 2.5e-4
+#: How far a step of `bdf2` may take a point from where the motion before would, over what the chain's own speed covers
+#: in the whole step: errors of steps add up, so shorter ones may miss by less.
+FAR_OFF = 0.014
 
-#: A miss of so many times `FAR_OFF` is one that may gain energy; to ask costs 2 % of the time of a rope that cracks.
-WILD = 8.0
-
-#: By what part of itself and the weights' the energy may rise in a step of order 2 that misses so far. Some chains of
-#: masses over four decades would gain 150 times their energy in 60 steps of 0.03 s; ropes at 1/240 s come nowhere near.
+#: By what part of itself and the weights' the energy may rise in a step of order 2 that misses. Some chains of masses
+#: over four decades would gain 150 times their energy in 60 steps of 0.03 s, and of eight ropes of 1000 links one would
+#: gain a fifth in 10 s at 1/240 s, cut into up to 16 parts.
 #: In one of order 1 it rises where rods push: 13 of 3000 chains of masses over eight decades that spin freely would
 #: gain 1 % to 640 times their energy in 30 steps of 0.02 s.
-MOST_RISE = 0.01
+MOST_RISE = 0.0005
 
 #: How many steps are of order 1 after one of order 2 has no solution, or would gain energy.
 CALMING = 6
@@ -88,7 +93,8 @@ class _Run:
     def __init__(self, chain: Chain, state: State, member: int, threads: int) -> None:
         self.chain, self.state, self.member = chain, state, member
         self.propose, self.close, self.accept, self.accept_calm = _ONE_THREAD if threads == 1 else _TWO_THREADS
-        self.far, self.missed = FAR_OFF * float(chain.lengths.sum()), math.inf
+        self.far, self.missed = math.inf, math.inf
+        self.kept: list[FloatArray] = []
 
     def closes(self, member: int, h: float, guess: int) -> bool:
         """Whether a step of h (s) of that member does, from that guess."""
@@ -100,6 +106,7 @@ class _Run:
         """The same for one of order 1, however far its guess is."""
         self.propose(self.chain, self.state, EULER, h, TURNING)
         descend(self.chain, self.state.room, self.state.q)
+        self.state.steps[5] = 1.0
         return bool(self.close(self.chain, self.state.room, self.state.q, 1.0, _CLOSE))
 
     def step(self, h: float, parts: int) -> float | None:
@@ -107,12 +114,12 @@ class _Run:
         rough = self.state.steps[3] > 0
         if self.member != EULER and not rough and self.closes(self.member, h, CHANGING):
             missed = miss(self.chain, self.state, h) if self.member == BDF2 else 0.0
-            if missed > self.far and parts < MOST_FOR_A_MISS and missed < PAYS * self.missed:
+            if missed > self.far and parts < MOST_FOR_A_MISS[int(self.state.steps[5])] and missed < PAYS * self.missed:
                 self.missed = missed
                 return None
-            if missed <= WILD * self.far or rise(self.chain, self.state, BDF2, h) <= MOST_RISE:
+            if missed <= self.far or rise(self.chain, self.state, BDF2, h) <= MOST_RISE:
                 self.accept(self.chain, self.state, self.member, h)
-                return 2.0 if missed < 0.1 * self.far or missed >= PAYS * self.missed else 1.0
+                return 2.0 if missed < LONGER * self.far or missed >= PAYS * self.missed else 1.0
         if self.member == CONSERVING:
             return None
         if not (self.closes(EULER, h, TURNING) or (parts >= SETTLED and self.settles(h))):
@@ -130,33 +137,36 @@ class _Run:
 
     def frame(self, dt: float) -> bool:
         """Take a step of dt (s), in as many parts as it needs; False, and at its start, where none is short enough."""
-        left, kept, steps = FINEST, None, self.state.steps
-        self.missed = math.inf
+        left, kept, steps = FINEST, False, self.state.steps
+        self.far, self.missed = FAR_OFF * float(steps[4]) * abs(dt), math.inf
         while left > 0:
             size = math.gcd(left, int(steps[2]))
-            if kept is None and size < FINEST:
-                kept = self.keep()
+            kept = kept or self.keep(size < FINEST)
             longer = self.step(dt * size / FINEST, FINEST // size)
             if longer is not None:
                 left -= size
                 steps[2] = min(FINEST, longer * size)
             elif size > 1:
-                kept = kept or self.keep()
+                kept = kept or self.keep(True)
                 steps[2] = size // 2
                 self.make_whole()
             else:
-                self.go_back(kept or self.keep())
+                self.go_back(kept)
                 return False
         return True
 
-    def keep(self) -> list[FloatArray]:
-        """The state as it is."""
-        return [array.copy() for array in self.state[:-1]]
+    def keep(self, needed: bool) -> bool:
+        """Keep the state as it is, in the room of one that was kept before, where that is needed; whether it was."""
+        if needed:
+            self.kept = self.kept or [np.empty_like(array) for array in self.state[:-1]]
+            for room, array in zip(self.kept, self.state[:-1], strict=True):
+                room[:] = array
+        return needed
 
-    def go_back(self, before: list[FloatArray]) -> None:
-        """To a state that was kept."""
-        for array, kept in zip(self.state[:-1], before, strict=True):
-            array[:] = kept
+    def go_back(self, kept: bool) -> None:
+        """To the state that was kept, if one was; a step that was not taken changed nothing."""
+        for array, room in zip(self.state[:-1], self.kept if kept else (), strict=kept):
+            array[:] = room
 
 
 def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int, threads: int = 1) -> int:

@@ -37,7 +37,7 @@ FINEST = 1024
 #: The members: implicit Euler, BDF2, and the one that conserves energy and momentum.
 EULER, BDF2, CONSERVING = 1, 2, 3
 
-#: What Newton's method begins with: the last turning and how it changed; or the last turning.
+#: What Newton's method begins with: the cubic through the last angles; or the last turning.
 CHANGING, TURNING = 0, 1
 
 #: What is no motion of a mass in a step, over the length of the chain up to it.
@@ -47,17 +47,19 @@ _STILL = 1e-9
 _FIRST_TURN = 0.2
 
 # The rows of the memory.
-_ROD, _SPEED, _ROD_BEFORE, _SPEED_BEFORE, _TURNED, _TURNED_BEFORE, _TENSION, _TENSION_RATE = 0, 2, 4, 6, 8, 9, 10, 11
+_ROD, _SPEED, _ROD_BEFORE, _SPEED_BEFORE = 0, 2, 4, 6
+_TURNED, _TURNED_RATE, _TURNED_BEND, _TENSION, _TENSION_RATE = 8, 9, 10, 11, 12
 
 
 class State(NamedTuple):
     """What is kept from step to step.
 
-    q, v (n,): angles and rates after the last step. gap (1,): 0, for rods are those of angles. memory (12, n): the
-    rods (x, y), m, their speeds (x, y), m/s, and both before the last step; the mean rates of the last two steps,
-    rad/s; tensions, N, and how they changed, N/s.
-    steps (4,): the length of the last two, s; the part of a step, of `FINEST`, to try next, 0 before the first; and how
-    many more steps are to be of order 1. room: where steps are computed.
+    q, v (n,): angles and rates after the last step. gap (1,): 0, for rods are those of angles. memory (13, n): the
+    rods (x, y), m, their speeds (x, y), m/s, and both before the last step; the divided differences of the last angles,
+    rad/s, rad/s^2 and rad/s^3; tensions, N, and how they changed, N/s.
+    steps (6,): the length of the last two, s; the part of a step, of `FINEST`, to try next, 0 before the first; how
+    many more steps are to be of order 1; the chain's own speed, m/s (`_own_speed`); and whether any step took a
+    descent. room: where steps are computed.
     """
 
     q: FloatArray
@@ -87,7 +89,7 @@ class _Formula(NamedTuple):
 
 def begin(q: FloatArray, v: FloatArray) -> State:
     """The state at the start, copied."""
-    return State(q.copy(), v.copy(), np.zeros(1), np.zeros((12, len(q))), np.zeros(4), room_for(len(q)))
+    return State(q.copy(), v.copy(), np.zeros(1), np.zeros((13, len(q))), np.zeros(6), room_for(len(q)))
 
 
 @inlined
@@ -133,6 +135,17 @@ def restart(chain: Chain, state: State) -> None:
     _write_motion(chain, state.memory, state.room.rows, state.q, state.v, _ROD)
 
 
+@inlined
+def _own_speed(chain: Chain, memory: FloatArray) -> float:
+    """How fast the chain moves of itself, m/s: from how fast its masses do, and how fast it falls by its own length."""
+    x, y, reach, mass, twice_kinetic = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(len(chain.lengths)):
+        x, y, reach = x + memory[_SPEED, i], y + memory[_SPEED + 1, i], reach + chain.lengths[i]
+        mass += 1.0 / chain.couplings[i + 1]
+        twice_kinetic += (x * x + y * y) / chain.couplings[i + 1]
+    return float(np.sqrt(twice_kinetic / mass + abs(chain.gravity) * reach))
+
+
 @compiled
 def start(chain: Chain, state: State, dt: float) -> None:
     """What a first step looks back on: the motion before the start, from the accelerations there.
@@ -158,11 +171,23 @@ def start(chain: Chain, state: State, dt: float) -> None:
     for i in range(n):
         turning = rows[WANTED_X, i]
         memory[_TURNED, i] = state.v[i] - 0.5 * h * turning
-        memory[_TURNED_BEFORE, i] = state.v[i] - 1.5 * h * turning
+        memory[_TURNED_RATE, i] = 0.5 * turning
         rows[ANGLE, i] = state.q[i] - h * state.v[i] + 0.5 * h * h * turning
         rows[GUESS, i] = state.v[i] - h * turning
     _write_motion(chain, memory, rows, rows[ANGLE, :n], rows[GUESS, :n], _ROD_BEFORE)
-    state.steps[0], state.steps[1], state.steps[2] = h, h, size
+    state.steps[0], state.steps[1], state.steps[2], state.steps[4] = h, h, size, _own_speed(chain, memory)
+
+
+@inlined
+def _followed(memory: FloatArray, first: int, last: int) -> tuple[FloatArray, ...]:
+    """What guesses go on from: the divided differences of angles; tensions, and how they changed."""
+    return (
+        memory[_TURNED, first:last],
+        memory[_TURNED_RATE, first:last],
+        memory[_TURNED_BEND, first:last],
+        memory[_TENSION, first:last],
+        memory[_TENSION_RATE, first:last],
+    )
 
 
 @inlined
@@ -170,8 +195,9 @@ def propose_some(chain: Chain, state: State, member: int, h: float, guess: int, 
     """What `propose` does, of rods `first` to `last` - 1."""
     rows, memory, h_last, h_before = state.room.rows, state.memory, state.steps[0], state.steps[1]
     f = _formula(member, h, h / h_last)
-    ahead = (h + h_last) / (h_last + h_before) if guess == CHANGING else 0.0
     later = h if guess == CHANGING else 0.0
+    second = later * (h + h_last)
+    third = second * (h + h_last + h_before)
     for axis in range(2):
         wanted, rod, speed = (
             rows[WANTED_X + axis, first:last],
@@ -187,10 +213,9 @@ def propose_some(chain: Chain, state: State, member: int, h: float, guess: int, 
     if first == 0 < last:
         rows[WANTED_Y, 0] -= f.scale * chain.gravity
     angle, pull, q = rows[ANGLE, first:last], rows[PULL, first:last], state.q[first:last]
-    turned, turned_before = memory[_TURNED, first:last], memory[_TURNED_BEFORE, first:last]
-    tension, tension_rate = memory[_TENSION, first:last], memory[_TENSION_RATE, first:last]
+    turned, rate, bent, tension, tension_rate = _followed(memory, first, last)
     for i in range(last - first):
-        angle[i] = q[i] + h * (turned[i] + ahead * (turned[i] - turned_before[i]))
+        angle[i] = q[i] + h * turned[i] + second * rate[i] + third * bent[i]
         pull[i] = f.scale * (tension[i] + later * tension_rate[i])
 
 
@@ -280,11 +305,14 @@ def accept_some(chain: Chain, state: State, member: int, h: float, first: int, l
             rod_before[i], speed_before[i] = rod[i], old_speed
             rod[i] = new
     angle, pull, q = rows[ANGLE, first:last], rows[PULL, first:last], state.q[first:last]
-    turned, turned_before = memory[_TURNED, first:last], memory[_TURNED_BEFORE, first:last]
-    tension, tension_rate = memory[_TENSION, first:last], memory[_TENSION_RATE, first:last]
+    turned, rate, bent, tension, tension_rate = _followed(memory, first, last)
+    second, third = h + state.steps[0], h + state.steps[0] + state.steps[1]
+    smooth = 0.0 if member == EULER else 1.0  # an error of order 1 would look like a bend
     for i in range(last - first):
-        turned_before[i] = turned[i]
-        turned[i] = (angle[i] - q[i]) / h
+        mean = (angle[i] - q[i]) / h
+        changed = (mean - turned[i]) / second
+        bent[i] = smooth * (changed - rate[i]) / third
+        turned[i], rate[i] = mean, changed
         pulled = pull[i] / f.scale
         tension_rate[i] = (pulled - tension[i]) / h
         tension[i] = pulled
