@@ -59,6 +59,7 @@ _FURTHEST = 0.3  # rad: a step that turned a rod further is not the one that was
 
 _CLOSE = 1e-6  # how far a rod may be from its length after such a step, relative to it; less after less, by the cube
 _ROUGH = 1e-2  # from where on the matrix of one iteration will not do for the next, and rods do not tell the step
+_NEAR = 1e-4
 _FRESH = 4  # iterations with one matrix; where these are not enough, each has its own
 _CHANGE = 1.25  # of a step from one to the next, as a first guess
 _GROWTH = 1.2  # of a step over that: where rods turn back, their turns say nothing; and what is far less is begun again
@@ -141,7 +142,7 @@ def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: 
     for iteration in range(MOST_ITERATIONS):
         between = 0.5 * (h + last)
         rows.speed_y[0] = falling - between * chain.gravity
-        open_rods, rough = write_new_rods(chain, rows, h, h * between, close, _ROUGH)
+        open_rods, rough = write_new_rods(chain, rows, h, h * between, close, _ROUGH if iteration == 0 else _NEAR)
         if open_rods == 0 and followed:
             return h
         if again or iteration >= _FRESH:
@@ -154,7 +155,8 @@ def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: 
                 break
             h *= min(change, _GROWTH)
             followed, close = True, max(CLOSE, _CLOSE * share * share * share)
-        correct(rows)
+        else:
+            correct(rows)
     rows.speed_y[0] = falling
     return 0.0
 
