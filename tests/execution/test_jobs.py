@@ -67,6 +67,17 @@ def test_arithmetic_takes_one_thread_unless_the_user_wants_more(monkeypatch):
     assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
+def test_a_pool_that_cannot_start_leaves_nothing_in_the_environment(monkeypatch):
+    def refuses(**_: object) -> None:
+        raise OSError("no more processes")
+
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    monkeypatch.setattr("pebble.ProcessPool", refuses)
+    with pytest.raises(OSError, match="no more"), LocalPool(1):
+        pass
+    assert "OPENBLAS_NUM_THREADS" not in os.environ
+
+
 def test_as_many_run_at_once_as_there_are_workers(pool, tmp_path):
     # Each waits for the other: run one after the other, both would time out.
     found = outcomes(pool, *(job(does.meet, str(tmp_path), key, 1, key=key) for key in "ab"))

@@ -100,7 +100,7 @@ def deaf_to_interrupts() -> Iterator[None]:
 
 
 #: What libraries ask, as they are loaded, for how many threads to do their arithmetic in.
-THREAD_VARIABLES: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+THREAD_VARIABLES: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @contextmanager

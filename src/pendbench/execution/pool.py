@@ -105,20 +105,22 @@ class LocalPool:
 
         refuse_without_guard()
         CONSTS.term_timeout = _STOPPING_S
-        self._threads.enter_context(one_thread_each())
-        self._pool = ProcessPool(max_workers=self.workers, context=self._starting, initializer=_begin)
-        with deaf_to_interrupts():
-            assert self._pool.active  # asking starts it
+        with ExitStack() as undone:
+            undone.enter_context(one_thread_each())
+            self._pool = ProcessPool(max_workers=self.workers, context=self._starting, initializer=_begin)
+            with deaf_to_interrupts():
+                assert self._pool.active  # asking starts it
+            self._threads = undone.pop_all()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if kind is None:
-            self._pool.close()
-        else:
-            _share_stopping_time(self.workers)
-            self._pool.stop()
-        self._pool.join()
-        self._threads.close()
+        with self._threads:
+            if kind is None:
+                self._pool.close()
+            else:
+                _share_stopping_time(self.workers)
+                self._pool.stop()
+            self._pool.join()
         self._starting.locks.clear()
 
     def run(self, jobs: Iterable[Job], *, alone: bool = False) -> Iterator[Outcome]:

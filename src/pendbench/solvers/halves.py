@@ -32,6 +32,8 @@ from pendbench.solvers.closing import (
 from pendbench.solvers.rods import (
     CONSERVING,
     EULER,
+    STEP,
+    STEP_BEFORE,
     State,
     accelerate,
     accept_some,
@@ -168,7 +170,7 @@ def accept_halves(chain: Chain, state: State, member: int, h: float) -> None:
         _each_half(_pull_along_means, state, h, rods=n)
         _each_half(_accelerate, chain, state, h, rods=n)
     _each_half(_accept, chain, state, member, h, rods=n)
-    state.steps[1], state.steps[0] = state.steps[0], h
+    state.steps[STEP_BEFORE], state.steps[STEP] = state.steps[STEP], h
 
 
 def accept_calm_halves(chain: Chain, state: State, h: float, most: float) -> bool:

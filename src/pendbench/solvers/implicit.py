@@ -35,10 +35,14 @@ from pendbench.solvers.halves import accept_calm_halves, accept_halves, close_ha
 from pendbench.solvers.methods import FixedStep, Form, add
 from pendbench.solvers.rods import (
     BDF2,
+    CALM,
     CHANGING,
     CONSERVING,
+    DESCENDED,
     EULER,
     FINEST,
+    OWN_SPEED,
+    PART,
     TURNING,
     State,
     accept,
@@ -56,19 +60,20 @@ from pendbench.solvers.rods import (
 #: there on the motion cannot be followed, and a sharper crack is only harder to close.
 MOST_FOR_A_MISS = (8, 2)
 
-#: After a step that misses by less than this part of what it may, twice the step is tried: that misses by four times.
+#: After a step that misses by less than this part of what it may, twice the step is tried. In the cracks of a rope that
+#: misses by some four times as much.
 LONGER = 0.2
 
 #: Cutting pays where it makes a miss smaller by this factor at least. It does not where a whip cracks.
 PAYS = 0.6
 
-#: How far a step of `bdf2` may take a point from where the motion before would, over what the chain's own speed covers
-#: in the whole step: errors of steps add up, so shorter ones may miss by less.
+#: How far a step of `bdf2` may take a point from where the motion before would, over what the chain's own speed at the
+#: start covers in the whole step: errors of steps add up, so shorter ones may miss by less.
 FAR_OFF = 0.014
 
 #: By what part of itself and the weights' the energy may rise in a step of order 2 that misses. Some chains of masses
-#: over four decades would gain 150 times their energy in 60 steps of 0.03 s, and of eight ropes of 1000 links one would
-#: gain a fifth in 10 s at 1/240 s, cut into up to 16 parts.
+#: over four decades would gain 150 times their energy in 60 steps of 0.03 s, and the finer such steps are, the more of
+#: them there are to gain in.
 #: In one of order 1 it rises where rods push: 13 of 3000 chains of masses over eight decades that spin freely would
 #: gain 1 % to 640 times their energy in 30 steps of 0.02 s.
 MOST_RISE = 0.0005
@@ -106,15 +111,19 @@ class _Run:
         """The same for one of order 1, however far its guess is."""
         self.propose(self.chain, self.state, EULER, h, TURNING)
         descend(self.chain, self.state.room, self.state.q)
-        self.state.steps[5] = 1.0
+        self.state.steps[DESCENDED] = 1.0
         return bool(self.close(self.chain, self.state.room, self.state.q, 1.0, _CLOSE))
 
     def step(self, h: float, parts: int) -> float | None:
         """Take a step of h (s), one of so many parts: by how much the next may be longer; None: it has to be cut."""
-        rough = self.state.steps[3] > 0
+        rough = self.state.steps[CALM] > 0
         if self.member != EULER and not rough and self.closes(self.member, h, CHANGING):
             missed = miss(self.chain, self.state, h) if self.member == BDF2 else 0.0
-            if missed > self.far and parts < MOST_FOR_A_MISS[int(self.state.steps[5])] and missed < PAYS * self.missed:
+            if (
+                missed > self.far
+                and parts < MOST_FOR_A_MISS[int(self.state.steps[DESCENDED])]
+                and missed < PAYS * self.missed
+            ):
                 self.missed = missed
                 return None
             if missed <= self.far or rise(self.chain, self.state, BDF2, h) <= MOST_RISE:
@@ -126,7 +135,7 @@ class _Run:
             return None
         if not self.accept_calm(self.chain, self.state, h, MOST_RISE if parts < FINEST else math.inf):
             return None
-        self.state.steps[3] = self.state.steps[3] - 1 if rough else CALMING
+        self.state.steps[CALM] = self.state.steps[CALM] - 1 if rough else CALMING
         return 2.0
 
     def make_whole(self) -> None:
@@ -138,17 +147,17 @@ class _Run:
     def frame(self, dt: float) -> bool:
         """Take a step of dt (s), in as many parts as it needs; False, and at its start, where none is short enough."""
         left, kept, steps = FINEST, False, self.state.steps
-        self.far, self.missed = FAR_OFF * float(steps[4]) * abs(dt), math.inf
+        self.far, self.missed = FAR_OFF * float(steps[OWN_SPEED]) * abs(dt), math.inf
         while left > 0:
-            size = math.gcd(left, int(steps[2]))
+            size = math.gcd(left, int(steps[PART]))
             kept = kept or self.keep(size < FINEST)
             longer = self.step(dt * size / FINEST, FINEST // size)
             if longer is not None:
                 left -= size
-                steps[2] = min(FINEST, longer * size)
+                steps[PART] = min(FINEST, longer * size)
             elif size > 1:
                 kept = kept or self.keep(True)
-                steps[2] = size // 2
+                steps[PART] = size // 2
                 self.make_whole()
             else:
                 self.go_back(kept)
@@ -164,9 +173,10 @@ class _Run:
         return needed
 
     def go_back(self, kept: bool) -> None:
-        """To the state that was kept, if one was; a step that was not taken changed nothing."""
-        for array, room in zip(self.state[:-1], self.kept if kept else (), strict=kept):
-            array[:] = room
+        """To the state that was kept, if one was: without one, no part of the step was taken."""
+        if kept:
+            for array, room in zip(self.state[:-1], self.kept, strict=True):
+                array[:] = room
 
 
 def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int, threads: int = 1) -> int:
@@ -175,7 +185,7 @@ def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int, t
     From Python, since a step of a long chain takes milliseconds: kernels that hold each other take long to compile.
     """
     run, taken = _Run(chain, state, member, threads), 0
-    if state.steps[2] == 0.0:
+    if state.steps[PART] == 0.0:
         start(chain, state, dt)
     while taken < steps and run.frame(dt):
         taken += 1

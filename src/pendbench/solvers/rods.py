@@ -37,7 +37,7 @@ FINEST = 1024
 #: The members: implicit Euler, BDF2, and the one that conserves energy and momentum.
 EULER, BDF2, CONSERVING = 1, 2, 3
 
-#: What Newton's method begins with: the cubic through the last angles; or the last turning.
+#: What Newton's method begins with: the last turning and how it changed, for `bdf2` how that did, too; or the turning.
 CHANGING, TURNING = 0, 1
 
 #: What is no motion of a mass in a step, over the length of the chain up to it.
@@ -45,6 +45,9 @@ _STILL = 1e-9
 
 #: Of a first step, the length squared times the largest angular acceleration, rad.
 _FIRST_TURN = 0.2
+
+# What `State.steps` has.
+STEP, STEP_BEFORE, PART, CALM, OWN_SPEED, DESCENDED = range(6)
 
 # The rows of the memory.
 _ROD, _SPEED, _ROD_BEFORE, _SPEED_BEFORE = 0, 2, 4, 6
@@ -58,8 +61,8 @@ class State(NamedTuple):
     rods (x, y), m, their speeds (x, y), m/s, and both before the last step; the divided differences of the last angles,
     rad/s, rad/s^2 and rad/s^3; tensions, N, and how they changed, N/s.
     steps (6,): the length of the last two, s; the part of a step, of `FINEST`, to try next, 0 before the first; how
-    many more steps are to be of order 1; the chain's own speed, m/s (`_own_speed`); and whether any step took a
-    descent. room: where steps are computed.
+    many more steps are to be of order 1; the chain's own speed at the start, m/s (`_own_speed`); and whether any step
+    took a descent. room: where steps are computed.
     """
 
     q: FloatArray
@@ -175,7 +178,8 @@ def start(chain: Chain, state: State, dt: float) -> None:
         rows[ANGLE, i] = state.q[i] - h * state.v[i] + 0.5 * h * h * turning
         rows[GUESS, i] = state.v[i] - h * turning
     _write_motion(chain, memory, rows, rows[ANGLE, :n], rows[GUESS, :n], _ROD_BEFORE)
-    state.steps[0], state.steps[1], state.steps[2], state.steps[4] = h, h, size, _own_speed(chain, memory)
+    state.steps[STEP], state.steps[STEP_BEFORE], state.steps[PART] = h, h, size
+    state.steps[OWN_SPEED] = max(_own_speed(chain, memory), _STILL * chain.lengths.sum() / abs(dt))
 
 
 @inlined
@@ -193,7 +197,7 @@ def _followed(memory: FloatArray, first: int, last: int) -> tuple[FloatArray, ..
 @inlined
 def propose_some(chain: Chain, state: State, member: int, h: float, guess: int, first: int, last: int) -> None:
     """What `propose` does, of rods `first` to `last` - 1."""
-    rows, memory, h_last, h_before = state.room.rows, state.memory, state.steps[0], state.steps[1]
+    rows, memory, h_last, h_before = state.room.rows, state.memory, state.steps[STEP], state.steps[STEP_BEFORE]
     f = _formula(member, h, h / h_last)
     later = h if guess == CHANGING else 0.0
     second = later * (h + h_last)
@@ -229,7 +233,7 @@ def propose(chain: Chain, state: State, member: int, h: float, guess: int) -> No
 def miss(chain: Chain, state: State, h: float) -> float:
     """How far (m) the points are from where speeds and their last change would take them."""
     rows, memory, lengths = state.room.rows, state.memory, chain.lengths
-    x, y, worst, half = 0.0, 0.0, 0.0, 0.5 * h * h / state.steps[0]
+    x, y, worst, half = 0.0, 0.0, 0.0, 0.5 * h * h / state.steps[STEP]
     for i in range(len(lengths)):
         v_x, v_y = memory[_SPEED, i], memory[_SPEED + 1, i]
         x += lengths[i] * rows[ROD_X, i] - memory[_ROD, i] - h * v_x - half * (v_x - memory[_SPEED_BEFORE, i])
@@ -245,7 +249,7 @@ def rise(chain: Chain, state: State, member: int, h: float) -> float:
     Over the kinetic energy before it, the largest of the weights, and what a motion by `_STILL` in the step has: a
     chain at rest moves by rounding.
     """
-    rows, memory, f = state.room.rows, state.memory, _formula(member, h, h / state.steps[0])
+    rows, memory, f = state.room.rows, state.memory, _formula(member, h, h / state.steps[STEP])
     x, y, new_x, new_y, height, reach, change, scale = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     still = 0.5 * (_STILL / h) ** 2
     for i in range(len(state.q)):
@@ -292,7 +296,7 @@ def accelerate(chain: Chain, state: State, h: float, first: int, last: int) -> N
 def accept_some(chain: Chain, state: State, member: int, h: float, first: int, last: int) -> None:
     """Go on to what closed, but for the speeds of the member that conserves."""
     rows, memory = state.room.rows, state.memory
-    f = _formula(member, h, h / state.steps[0])
+    f = _formula(member, h, h / state.steps[STEP])
     lengths = chain.lengths[first:last]
     for axis in range(2):
         closed = rows[ROD_X if axis == 0 else ROD_Y, first:last]
@@ -306,8 +310,9 @@ def accept_some(chain: Chain, state: State, member: int, h: float, first: int, l
             rod[i] = new
     angle, pull, q = rows[ANGLE, first:last], rows[PULL, first:last], state.q[first:last]
     turned, rate, bent, tension, tension_rate = _followed(memory, first, last)
-    second, third = h + state.steps[0], h + state.steps[0] + state.steps[1]
-    smooth = 0.0 if member == EULER else 1.0  # an error of order 1 would look like a bend
+    second, third = h + state.steps[STEP], h + state.steps[STEP] + state.steps[STEP_BEFORE]
+    # An error of order 1 looks like a bend; and where only one guess is made, a cubic leads astray more often.
+    smooth = 1.0 if member == BDF2 else 0.0
     for i in range(last - first):
         mean = (angle[i] - q[i]) / h
         changed = (mean - turned[i]) / second
@@ -327,7 +332,7 @@ def accept(chain: Chain, state: State, member: int, h: float) -> None:
         pull_along_means(state, h, 0, n)
         accelerate(chain, state, h, 0, n)
     accept_some(chain, state, member, h, 0, n)
-    state.steps[1], state.steps[0] = state.steps[0], h
+    state.steps[STEP_BEFORE], state.steps[STEP] = state.steps[STEP], h
 
 
 @compiled

@@ -31,7 +31,7 @@ def provenance(plan: Plan, workers: int) -> dict[str, Any]:
         "logical processors": os.cpu_count(),
         "worker processes": workers,
         "threads per engine": 1,
-        **{name: os.environ.get(name, "1") for name in THREAD_VARIABLES},  # of the worker processes
+        **{name: os.environ.get(name, "1") for name in THREAD_VARIABLES},  # of worker processes on this machine
         "seed": getattr(plan.options, "seed", None),
         "study": plan.name,
         "kind": plan.options.kind,
