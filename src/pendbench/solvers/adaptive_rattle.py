@@ -59,7 +59,7 @@ _FURTHEST = 0.3  # rad: a step that turned a rod further is not the one that was
 
 _CLOSE = 1e-6  # how far a rod may be from its length after such a step, relative to it; less after less, by the cube
 _ROUGH = 1e-2  # from where on the first iteration's matrix will not do for the next
-_NEAR = 1e-4  # so near, rods tell the step: they are corrected together with what another step changes
+_NEAR = 1e-4  # so near, rods tell the step, and are corrected together with what it changes; and later matrices do
 _FRESH = 4  # iterations with one matrix; where these are not enough, each has its own
 _CHANGE = 1.25  # of a step from one to the next, as a first guess
 _GROWTH = 1.2  # of a step over that: where rods turn back, their turns say nothing; and what is far less is begun again

@@ -146,37 +146,36 @@ class _Run:
 
     def frame(self, dt: float) -> bool:
         """Take a step of dt (s), in as many parts as it needs; False, and at its start, where none is short enough."""
-        left, kept, steps = FINEST, False, self.state.steps
+        left, kept, steps = FINEST, None, self.state.steps
         self.far, self.missed = FAR_OFF * float(steps[OWN_SPEED]) * abs(dt), math.inf
         while left > 0:
             size = math.gcd(left, int(steps[PART]))
-            kept = kept or self.keep(size < FINEST)
+            if kept is None and size < FINEST:
+                kept = self.keep()
             longer = self.step(dt * size / FINEST, FINEST // size)
             if longer is not None:
                 left -= size
                 steps[PART] = min(FINEST, longer * size)
             elif size > 1:
-                kept = kept or self.keep(True)
+                kept = kept or self.keep()
                 steps[PART] = size // 2
                 self.make_whole()
             else:
-                self.go_back(kept)
+                self.go_back(kept or self.keep())
                 return False
         return True
 
-    def keep(self, needed: bool) -> bool:
-        """Keep the state as it is, in the room of one that was kept before, where that is needed; whether it was."""
-        if needed:
-            self.kept = self.kept or [np.empty_like(array) for array in self.state[:-1]]
-            for room, array in zip(self.kept, self.state[:-1], strict=True):
-                room[:] = array
-        return needed
+    def keep(self) -> list[FloatArray]:
+        """The state as it is, in the room of the one that was kept before."""
+        self.kept = self.kept or [np.empty_like(array) for array in self.state[:-1]]
+        for room, array in zip(self.kept, self.state[:-1], strict=True):
+            room[:] = array
+        return self.kept
 
-    def go_back(self, kept: bool) -> None:
-        """To the state that was kept, if one was: without one, no part of the step was taken."""
-        if kept:
-            for array, room in zip(self.state[:-1], self.kept, strict=True):
-                array[:] = room
+    def go_back(self, before: list[FloatArray]) -> None:
+        """To a state that was kept."""
+        for array, kept in zip(self.state[:-1], before, strict=True):
+            array[:] = kept
 
 
 def take_steps(chain: Chain, state: State, member: int, dt: float, steps: int, threads: int = 1) -> int:

@@ -32,6 +32,7 @@ def provenance(plan: Plan, workers: int) -> dict[str, Any]:
         "worker processes": workers,
         "threads per engine": 1,
         **{name: os.environ.get(name, "1") for name in THREAD_VARIABLES},  # of worker processes on this machine
+        "NUMBA_NUM_THREADS": os.environ.get("NUMBA_NUM_THREADS", "not set"),
         "seed": getattr(plan.options, "seed", None),
         "study": plan.name,
         "kind": plan.options.kind,
