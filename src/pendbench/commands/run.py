@@ -6,14 +6,13 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from pendbench.base.errors import InputError
 from pendbench.base.files import alone_in
 from pendbench.base.processes import processors, refuse_without_guard
 from pendbench.base.strict import input_error, show, shown_path
 from pendbench.commands.staging import stage_of_study
-from pendbench.commands.study_table import StudyTable
 from pendbench.engines.elsewhere import use
 from pendbench.engines.registry import engine_names
 from pendbench.execution.cluster import DaskPool
@@ -33,6 +32,9 @@ from pendbench.study.motions import Motions, measure_motions
 from pendbench.study.plan import Plan, find_study, load_plan
 from pendbench.study.provenance import provenance
 from pendbench.study.results import Results
+
+if TYPE_CHECKING:
+    from pendbench.commands.study_table import StudyTable
 
 _MOST_WORKERS: Final = 1024
 _LONGEST_NAME: Final = 100
@@ -122,12 +124,12 @@ def run_request(request: Request, watcher: Watcher | None = None) -> Finished:
             write_report(report, out, stage_of_study(motions))
     if request.out is None:
         write_index(out.parent)
-    cases = data_frame(report.cases)
     if request.update_baseline:
-        write_baseline(where, cases)
+        write_baseline(where, data_frame(report.cases))
     notes = tuple(f"{scene.name}: {note}" for scene in plan.scenes for note in scene.notes)
     if baseline is None:
         return Finished(report, out, notes=notes)
+    cases = data_frame(report.cases)
     return Finished(report, out, tuple(regressions(cases, baseline)), len(cases), notes)
 
 
@@ -217,6 +219,8 @@ def run_study(
 
     Raises InputError, one line, for whatever cannot be used.
     """
+    from pendbench.commands.study_table import StudyTable
+
     folder, chosen = folder_of(out), names_of(engines)
     others = (scenes,) if isinstance(scenes, Scene | str | os.PathLike) else tuple(scenes)
     request = Request(

@@ -74,7 +74,6 @@ def read_side(path: str | os.PathLike[str]) -> Results | Gate:
 
 
 def _results(folder: Path) -> Results:
-    import pandas as pd
 
     from pendbench.study.case_table import read_cases
     from pendbench.study.changes import DIVERGES, REPRODUCED, TIMES
@@ -84,7 +83,7 @@ def _results(folder: Path) -> Results:
     numbers = [*(measure.name for measure in (*REPRODUCED, *TIMES, DIVERGES)), *SAYING, "order_claimed"]
     try:
         table = read_cases(file, numbers)
-    except (OSError, ValueError, pd.errors.ParserWarning) as error:
+    except (OSError, ValueError) as error:
         raise input_error(shown_path(file), f"not a study's cases: {describe(error)}") from None
     if table.empty:
         raise input_error(shown_path(file), "has no rows; allowed: a study's cases")

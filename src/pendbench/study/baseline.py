@@ -10,17 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
-
-import pandas as pd
+from typing import TYPE_CHECKING, Final
 
 from pendbench.base.errors import describe
 from pendbench.base.faults import STATUSES
 from pendbench.base.files import write_whole
 from pendbench.base.strict import input_error, shown_path
 from pendbench.measures.verdict import rank
-from pendbench.study.case_table import KEYS, case_key, case_text, read_cases
+from pendbench.study.case_table import KEYS, case_key, case_text, is_missing, read_cases
 from pendbench.study.changes import REPRODUCED, Measure, Range, told_by
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Words that are better or worse.
 _WORDS: Final = ("verdict",)
@@ -46,7 +47,7 @@ def read_baseline(path: Path) -> pd.DataFrame:
         return read_cases(path, [measure.name for measure in REPRODUCED])
     except FileNotFoundError:
         raise input_error(where, "no baseline to check against; --update-baseline writes one") from None
-    except (OSError, ValueError, pd.errors.ParserWarning) as error:
+    except (OSError, ValueError) as error:
         raise input_error(where, f"not a baseline: {describe(error)}") from None
 
 
@@ -82,7 +83,7 @@ def _moved(before: pd.Series, now: pd.Series) -> Iterator[tuple[Measure, str]]:
     """Each number that is where it may not be, and what to say of it."""
     for measure in REPRODUCED:
         column = measure.name
-        if column not in before or column not in now or pd.isna(before[column]):
+        if column not in before or column not in now or is_missing(before[column]):
             continue
         was, value = float(before[column]), float(now[column])
         if measure.moved(was, value):

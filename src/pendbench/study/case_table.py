@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Final
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, Final
 
 from pendbench.base.errors import choose, printable
 from pendbench.base.faults import STATUSES
 from pendbench.measures.verdict import VERDICTS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: What names a case.
 KEYS: Final = ("scene", "engine", "method", "dt", "settings")
@@ -20,11 +22,16 @@ KEYS: Final = ("scene", "engine", "method", "dt", "settings")
 def read_cases(path: Path, numbers: Iterable[str]) -> pd.DataFrame:
     """The table; the columns that are named, and the step, are numbers, all others text.
 
-    Raises ValueError or ParserWarning where it is no such table, and OSError where it cannot be read.
+    Raises ValueError where it is no such table, and OSError where it cannot be read.
     """
+    import pandas as pd
+
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # lines longer than the heading
-        table = pd.read_csv(path, dtype=str, keep_default_na=False, index_col=False)
+        try:
+            table = pd.read_csv(path, dtype=str, keep_default_na=False, index_col=False)
+        except pd.errors.ParserWarning as error:
+            raise ValueError(str(error)) from None
     for name in (*KEYS, "status"):
         if name not in table:
             raise ValueError(f"column {name!r} is missing")
@@ -40,10 +47,15 @@ def read_cases(path: Path, numbers: Iterable[str]) -> pd.DataFrame:
     return table
 
 
+def is_missing(cell: Any) -> bool:
+    """Whether a cell is empty."""
+    return isinstance(cell, float) and math.isnan(cell)
+
+
 def case_key(row: pd.Series) -> tuple[str, ...]:
     """What tells the cases of a table apart, as text."""
-    dt = "" if pd.isna(row["dt"]) else f"{float(row['dt']):g}"
-    settings = "" if pd.isna(row["settings"]) else str(row["settings"])
+    dt = "" if is_missing(row["dt"]) else f"{float(row['dt']):g}"
+    settings = "" if is_missing(row["settings"]) else str(row["settings"])
     return str(row["scene"]), str(row["engine"]), str(row["method"]), dt, settings
 
 
