@@ -195,7 +195,7 @@ def test_masses_that_leap_by_a_hundred_decades_keep_their_digits():
     rng = np.random.default_rng(12)
     leaping = np.where(np.arange(20) % 2, 1e50, 1e-50)
     scene = chain(20, mass=leaping, angle=rng.uniform(-3.0, 3.0, 20), rate=rng.uniform(-5.0, 5.0, 20))
-    assert relative_error(at_start(accelerations, scene), exact_accelerations(scene, digits=400)) < 1e-13
+    assert relative_error(at_start(accelerations, scene), exact_accelerations(scene)) < 1e-13
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.7, np.pi / 2])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-import mpmath
 import numpy as np
+from flint import arb, arb_mat, ctx
 
 from pendbench.scene.scene import Effects, Scene
 
@@ -54,52 +55,61 @@ def hard_chains(kind: str, seeds: range) -> Iterator[Scene]:
             yield Scene(kind, "", 1.0, masses, lengths, angles, rng.uniform(-5.0, 5.0, n), Effects(gravity=GRAVITY))
 
 
-def exact_accelerations(scene: Scene, digits: int = 50) -> list[mpmath.mpf]:
-    """theta'' (n,) rad/s^2 at the scene's start: (E6) element by element, solved with that many digits."""  # noqa: D403
-    with mpmath.workdps(digits):
-        m, l, a, w = (  # noqa: E741
-            [mpmath.mpf(float(x)) for x in part] for part in (scene.masses, scene.lengths, scene.angles, scene.rates)
-        )
-        n, gravity = scene.n, mpmath.mpf(scene.effects.gravity or 0.0)
-        hanging = [mpmath.fsum(m[i:]) for i in range(n)]
-        left, right = mpmath.matrix(n, n), mpmath.matrix(n, 1)
+def exact_accelerations(scene: Scene) -> list[arb]:
+    """theta'' (n,) rad/s^2 at the scene's start to fifty digits: (E6), element by element.
+
+    In ball arithmetic, which knows how far off it is: where digits are lost, more are carried.
+    """  # noqa: D403
+    for digits in itertools.count(60, 60):
+        exact = _solved(scene, digits)
+        if largest(number.rad() for number in exact) < 1e-50 * largest(exact):
+            break
+    return exact
+
+
+def _solved(scene: Scene, digits: int) -> list[arb]:
+    """(E6), with that many digits carried."""
+    with ctx.workdps(digits):
+        m, l, a, w = _parts(scene)  # noqa: E741
+        n, gravity = scene.n, arb(scene.effects.gravity or 0.0)
+        hanging = [sum(m[i:], arb(0)) for i in range(n)]
+        left, right = arb_mat(n, n), arb_mat(n, 1)
         for i in range(n):
-            right[i] = -hanging[i] * gravity * l[i] * mpmath.sin(a[i])
+            right[i, 0] = -hanging[i] * gravity * l[i] * a[i].sin()
             for j in range(n):
-                cosine, sine = mpmath.cos_sin(a[j] - a[i])
+                sine, cosine = (a[j] - a[i]).sin_cos()
                 weight = hanging[max(i, j)] * l[i] * l[j]
                 left[i, j] = weight * cosine
-                right[i] += weight * sine * w[j] ** 2
-        return list(mpmath.lu_solve(left, right))
+                right[i, 0] += weight * sine * w[j] ** 2
+        return list(left.solve(right).entries())
 
 
-def exact_by_tensions(scene: Scene) -> list[mpmath.mpf]:
+def exact_by_tensions(scene: Scene) -> list[arb]:
     """theta'' (n,) rad/s^2 at the scene's start to 50 digits, in O(n): for chains too long for the dense form.
 
     The tridiagonal system for the tensions (docs/equations.md, A third form), eliminated outwards, and (E19). A pivot
     may lose as many digits as the masses are apart, so these are carried beside the fifty, twice.
     """  # noqa: D403
     decades = math.ceil(math.log10(scene.masses.max() / scene.masses.min()))
-    with mpmath.workdps(50 + 2 * decades):
-        m, l, a, w = (  # noqa: E741
-            [mpmath.mpf(float(x)) for x in part] for part in (scene.masses, scene.lengths, scene.angles, scene.rates)
-        )
-        weight, bends = mpmath.mpf(scene.effects.gravity or 0.0), list(map(_bend, a, a[1:]))
+    with ctx.workdps(50 + 2 * decades):
+        m, l, a, w = _parts(scene)  # noqa: E741
+        weight = arb(scene.effects.gravity or 0.0)
+        bends = [(outer - inner).sin_cos() for inner, outer in itertools.pairwise(a)]
         wanted = [length * rate**2 for length, rate in zip(l, w, strict=True)]
-        wanted[0] += weight * mpmath.cos(a[0])
-        tension = _tensions([1 / x for x in m], [c for c, _ in bends], wanted)
-        outwards = [s * pull / mass for (_, s), pull, mass in zip(bends, tension[1:], m[:-1], strict=True)]
-        inwards = [s * pull / mass for (_, s), pull, mass in zip(bends, tension[:-1], m[:-1], strict=True)]
-        across = zip([*outwards, mpmath.mpf(0)], [weight * mpmath.sin(a[0]), *inwards], l, strict=True)
+        wanted[0] += weight * a[0].cos()
+        tension = _tensions([1 / x for x in m], [c for _, c in bends], wanted)
+        outwards = [s * pull / mass for (s, _), pull, mass in zip(bends, tension[1:], m[:-1], strict=True)]
+        inwards = [s * pull / mass for (s, _), pull, mass in zip(bends, tension[:-1], m[:-1], strict=True)]
+        across = zip([*outwards, arb(0)], [weight * a[0].sin(), *inwards], l, strict=True)
         return [(out - back) / length for out, back, length in across]
 
 
-def _bend(inner: mpmath.mpf, outer: mpmath.mpf) -> tuple[mpmath.mpf, mpmath.mpf]:
-    cosine, sine = mpmath.cos_sin(outer - inner)
-    return cosine, sine
+def _parts(scene: Scene) -> list[list[arb]]:
+    """Masses, lengths, angles and rates."""
+    return [list(map(arb, part.tolist())) for part in (scene.masses, scene.lengths, scene.angles, scene.rates)]
 
 
-def _tensions(light: list[mpmath.mpf], cosines: list[mpmath.mpf], wanted: list[mpmath.mpf]) -> list[mpmath.mpf]:
+def _tensions(light: list[arb], cosines: list[arb], wanted: list[arb]) -> list[arb]:
     """The tensions (n,) from the masses' inverses (n,), the bends' cosines (n - 1,) and the right-hand sides (n,)."""
     pivots, right = [light[0]], [wanted[0]]
     for i, cosine in enumerate(cosines, start=1):
@@ -113,8 +123,12 @@ def _tensions(light: list[mpmath.mpf], cosines: list[mpmath.mpf], wanted: list[m
     return pulls[::-1]
 
 
-def relative_error(found: np.ndarray, exact: list[mpmath.mpf]) -> float:
+def largest(numbers: Iterable[arb]) -> float:
+    """The largest size that any of them can have."""
+    return max(float(number.abs_upper()) for number in numbers)
+
+
+def relative_error(found: np.ndarray, exact: list[arb]) -> float:
     """The largest error of a component over the largest component."""
-    with mpmath.workdps(50):
-        worst = max(abs(mpmath.mpf(float(f)) - e) for f, e in zip(found, exact, strict=True))
-        return float(worst / max(abs(e) for e in exact))
+    with ctx.workdps(50):
+        return largest(arb(float(f)) - e for f, e in zip(found, exact, strict=True)) / largest(exact)
