@@ -19,7 +19,6 @@ from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from multiprocessing.context import SpawnContext
 from types import TracebackType
 from typing import Any, Final, Protocol, Self
 
@@ -28,6 +27,7 @@ from pendbench.base.faults import Fault
 from pendbench.base.processes import deaf_to_interrupts, one_thread_each, refuse_without_guard
 from pendbench.execution import limits
 from pendbench.execution.limits import GB, held
+from pendbench.execution.starting import AsCopies, FromNothing, take_over, way_to_start
 
 _STOPPING_S: Final = 0.5  # how long a worker has to end by itself; it holds nothing that could be lost
 _NO_WORKERS: Final = "the worker processes died as they started; what was finished is kept"
@@ -77,28 +77,14 @@ class Executor(Protocol):
         """The outcome of each job, in the order in which they finish. alone: one at a time, for timings."""
 
 
-class _Starting(SpawnContext):
-    """Starts processes, and keeps the locks that were made for them.
-
-    The pool drops its locks before it ends its processes: one that is just starting would look for them, find none, and
-    print a traceback.
-    """
-
-    def __init__(self) -> None:
-        self.locks: list[Any] = []
-
-    def RLock(self) -> Any:  # noqa: N802, the name is multiprocessing's
-        self.locks.append(super().RLock())
-        return self.locks[-1]
-
-
 class LocalPool:
     """Processes of this machine, from `with` to its end."""
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
         self._pool: Any = None
-        self._starting, self._threads = _Starting(), ExitStack()
+        self._starting: FromNothing | AsCopies | None = None
+        self._threads = ExitStack()
 
     def __enter__(self) -> Self:
         from pebble import CONSTS, ProcessPool
@@ -107,11 +93,20 @@ class LocalPool:
         CONSTS.term_timeout = _STOPPING_S
         with ExitStack() as undone:
             undone.enter_context(one_thread_each())
-            self._pool = ProcessPool(max_workers=self.workers, context=self._starting, initializer=_begin)
+            self._starting = way_to_start()
+            self._pool = ProcessPool(
+                max_workers=self.workers, context=self._starting, initializer=_begin, initargs=(dict(os.environ),)
+            )
             with deaf_to_interrupts():
-                assert self._pool.active  # asking starts it
+                self._start()
             self._threads = undone.pop_all()
         return self
+
+    def _start(self) -> None:
+        try:
+            assert self._pool.active  # asking starts it
+        except BrokenProcessPool as error:
+            raise InputError(f"worker processes cannot be started: {describe(error.__cause__ or error)}") from None
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         with self._threads:
@@ -121,7 +116,7 @@ class LocalPool:
                 _share_stopping_time(self.workers)
                 self._pool.stop()
             self._pool.join()
-        self._starting.locks.clear()
+        self._starting = None
 
     def run(self, jobs: Iterable[Job], *, alone: bool = False) -> Iterator[Outcome]:
         """The outcome of each job, in the order in which they finish.
@@ -165,9 +160,10 @@ def _share_stopping_time(workers: int) -> None:
 _at_start = 0
 
 
-def _begin() -> None:
+def _begin(environment: dict[str, str]) -> None:
     """What a worker does first."""
     global _at_start  # noqa: PLW0603
+    take_over(environment)
     limits.prepare()
     _at_start = held() or 0
     threading.Thread(target=_leave_with_parent, daemon=True).start()
