@@ -15,7 +15,7 @@ from matplotlib.colors import to_rgb
 from pendbench.kinds.chaos import page
 from pendbench.kinds.chaos.plots import TIME, cost_figure, error_curves
 from pendbench.kinds.chaos.rows import CurveRow
-from pendbench.report.plots import bounds, draw, hue, shades
+from pendbench.report.plots import Drawn, bounds, hue, shades
 from pendbench.report.styles import Styles
 from support.reading import assert_words_apart
 from support.report_data import ENGINE, report, results
@@ -33,12 +33,10 @@ def styles():
 def figures():
     """Every figure of the made-up results by the name of its file, laid out."""
     made = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page, "draw", lambda figure_of: figure_of)
-        for picture in page.pictures(results(), report().tables):
-            with matplotlib.style.context("default"):
-                made[picture.name] = picture.drawn()
-                FigureCanvasAgg(made[picture.name]).draw()
+    for picture in page.pictures(results(), report().tables):
+        with matplotlib.style.context("default"):
+            made[picture.name] = picture.drawn.figure_of()
+            FigureCanvasAgg(made[picture.name]).draw()
     return made
 
 
@@ -172,7 +170,7 @@ def test_limits_are_decades_around_what_there_is(values, expected):
 
 def test_the_style_of_the_user_changes_nothing():
     figure_of = partial(cost_figure, styles(), cases_of("wild"), TIME)
-    plain = draw(figure_of).png
+    plain = Drawn(figure_of).png
     with matplotlib.rc_context({"font.size": 20, "axes.facecolor": "black", "savefig.dpi": 30}):
-        assert draw(figure_of).png == plain
+        assert Drawn(figure_of).png == plain
         assert matplotlib.rcParams["font.size"] == 20

@@ -32,12 +32,10 @@ def report():
 def figures(report):
     """Every figure of the made-up results by the name of its file, laid out."""
     made = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cost_plots, "draw", lambda figure_of: figure_of)
-        for picture in cost_plots.pictures(report.results, report.tables):
-            with matplotlib.style.context("default"):
-                made[picture.name] = picture.drawn()
-                FigureCanvasAgg(made[picture.name]).draw()
+    for picture in cost_plots.pictures(report.results, report.tables):
+        with matplotlib.style.context("default"):
+            made[picture.name] = picture.drawn.figure_of()
+            FigureCanvasAgg(made[picture.name]).draw()
     return made
 
 

@@ -65,9 +65,8 @@ def page(written):
     return (written / "report.md").read_text("utf-8")
 
 
-def page_of(found, out):
-    write_report(Report(found), out)
-    return (out / "report.md").read_text("utf-8")
+def page_of(found):
+    return Report(found).markdown()
 
 
 def answer(found):
@@ -110,9 +109,9 @@ def assert_tables(text):
         width = cells
 
 
-def test_tables_are_tables_whatever_is_in_them(page, tmp_path):
+def test_tables_are_tables_whatever_is_in_them(page):
     assert_tables(page)
-    theirs = page_of(results(scenes=("a01",), engines=(ENGINE,)), tmp_path)  # its name is the best there is
+    theirs = page_of(results(scenes=("a01",), engines=(ENGINE,)))  # its name is the best there is
     assert_tables(theirs)
     assert cells_of(section(theirs, "The answer"))[:2] == [["scene", ENGINE], ["a01", "not reached (best 1.0e-2)"]]
 
@@ -199,14 +198,14 @@ def test_the_cheapest_is_bold(page):
     assert set(bold) == {"≤ 40 ms", "400 ms"}
 
 
-def test_orders_show_what_is_claimed_and_what_is_seen(page, tmp_path):
+def test_orders_show_what_is_claimed_and_what_is_seen(page):
     rows = {tuple(row[:2]): row[2:] for row in cells_of(section(page, "Orders"))[1:]}
     assert rows["ours", "rk4"] == ["4", "4.00", "4.00", "4.00"]
     assert rows["other", "euler iterations=10"][:2] == ["1", "1.00"]
     assert ("ours", "adaptive") not in rows
     # An error that should have been 1e-8, but is 1e-5: the order between the other two stays, and then it stops.
     worse = with_runs(results(scenes=("calm",), engines=("ours",)), {"error_max": 1e-5}, lambda case: case.dt == 1e-3)
-    text = page_of(worse, tmp_path)
+    text = page_of(worse)
     rows = {tuple(row[:2]): row[2:] for row in cells_of(section(text, "Orders"))[1:]}
     assert rows["ours", "rk4"] == ["4", "4.00, stops at 1.0e-5"]
     assert "- calm: ours rk4: plateau: the error stops at 1.0e-05" in section(text, "What is odd")
@@ -220,12 +219,12 @@ def test_one_more_digit_costs_what_the_order_says(page):
     assert not any(name == ENGINE for name, _ in rows)  # two points say nothing of how sure a line is
 
 
-def test_the_long_pendulum_has_its_section_where_it_is_part_of_the_study(page, tmp_path):
+def test_the_long_pendulum_has_its_section_where_it_is_part_of_the_study(page):
     rows = cells_of(section(page, "The pendulum of the benchmark A01"))
     assert rows[0] == ["engine", "to 1e-3 m", "smallest error", "of"]
     assert rows[1] == ["ours", "≤ 40 ms: adaptive, tolerance 1.0e-4", "1.0e-8", "ours adaptive tolerance=1e-08"]
     assert rows[3] == [ENGINE, "not reached (best 1.0e-2)", "1.0e-2", f"{ENGINE} -1+1`$\\frac$, step 0.001 s"]
-    assert "pendulum of" not in page_of(results(scenes=("calm",)), tmp_path)
+    assert "pendulum of" not in page_of(results(scenes=("calm",)))
 
 
 def test_reading_every_state_has_its_price(page):
@@ -319,7 +318,7 @@ def test_failures_are_in_the_table(page):
          "the truth is known up to 1.2 s, and not to 2 s (ends at its horizon)"),
     ],
 )  # fmt: skip
-def test_a_truth_that_is_late_is_no_engine_s_error(truth, says, tmp_path):
+def test_a_truth_that_is_late_is_no_engine_s_error(truth, says):
     found = with_runs(results(scenes=("calm",), engines=("ours",)), {"error_max": NAN}, lambda _: True)
     found = replace(found, found=replace(found.found, truths={"calm": truth}))
     report = Report(found)
@@ -327,12 +326,12 @@ def test_a_truth_that_is_late_is_no_engine_s_error(truth, says, tmp_path):
         assert (row.status, row.reason) == ("ok", f"not compared: {says}")
         assert row.measured.run.energy_drift_max > 0
     assert report.answer.startswith("None of the 6 cases")
-    page = page_of(found, tmp_path)
+    page = page_of(found)
     assert f"- calm: not compared: {says}" in section(page, "The scenes")
     assert "none measured (no error)" in section(page, "The answer")
 
 
-def test_scene_in_which_nothing_moves_is_said_to_be_one_and_has_no_price(tmp_path):
+def test_scene_in_which_nothing_moves_is_said_to_be_one_and_has_no_price():
     found = with_runs(
         results(scenes=("calm", "a01"), engines=("ours",)), {"error_max": 0.0}, lambda case: case.scene.n == 2
     )
@@ -343,14 +342,14 @@ def test_scene_in_which_nothing_moves_is_said_to_be_one_and_has_no_price(tmp_pat
     assert report.answer.startswith("Nothing moves in calm: it starts at rest, and nothing pulls it.")
     assert "the cheapest engine is ours in a01." in report.answer
     assert {row.flags for row in report.cases if row.case.scene.name == "calm"} == {"nothing moves"}
-    odd = section(page_of(found, tmp_path), "What is odd")
+    odd = section(page_of(found), "What is odd")
     assert "too good" not in odd
 
 
-def test_flags_of_all_steps_are_said_once_and_timings_are_not_among_them(tmp_path):
+def test_flags_of_all_steps_are_said_once_and_timings_are_not_among_them():
     found = with_runs(results(scenes=("calm",), engines=("ours",)), {"error_max": 0.0}, lambda case: case.dt == 1e-3)
     found = with_runs(found, {"error_max": 2e-3}, lambda case: case.dt == 2e-2)
-    odd = section(page_of(with_timings(found, step_spread=0.4), tmp_path), "What is odd")
+    odd = section(page_of(with_timings(found, step_spread=0.4)), "What is odd")
     assert odd.count("ours rk4: order 4.3 where 4 is claimed") == 1  # log2(2e-3 / 1e-4) = 4.32
     assert odd.count("ours rk4, step 0.001 s: too good: no error at all") == 1
     assert "noisy" not in odd
@@ -363,13 +362,13 @@ def test_the_page_names_what_is_noisy(page):
     assert trust.count("spread 50%") == 1
 
 
-def test_runs_too_short_to_time_are_counted(page, tmp_path):
+def test_runs_too_short_to_time_are_counted(page):
     text = "less than 100 µs to the time of comparison"
     # Ours for two seconds: 40 us; for one: 20, 64 and 50 us. What takes 100 us is not among them.
     short = sum(0 < row.timing.run_s < 1e-4 for row in (row.measured for row in Report(results()).cases))
     assert f"{short} cases take {text}" in page
     assert short == 4
-    assert text not in page_of(results(scenes=("a01",)), tmp_path)
+    assert text not in page_of(results(scenes=("a01",)))
 
 
 # The answer: every sentence from the numbers that its tables show.
@@ -399,9 +398,9 @@ def ratios_of(page, engine):
 
 
 @pytest.mark.parametrize("dear", [0.3, 1.0, 7.0, 100.0])
-def test_the_answer_s_numbers_stand_in_the_table_below_it(dear, tmp_path):
+def test_the_answer_s_numbers_stand_in_the_table_below_it(dear):
     found = results(scenes=("calm", "a01"), engines=("ours", "other"), dear=dear)
-    text, page = answer(found), page_of(found, tmp_path)
+    text, page = answer(found), page_of(found)
     told = dict(re.findall(rf"(\w+) takes ([\d.{TIMES} to]+) as long", text))
     for engine in ("ours", "other"):
         shown = sorted(set(ratios_of(page, engine)), key=lambda ratio: float(ratio.rstrip(TIMES)))
@@ -412,12 +411,12 @@ def test_the_answer_s_numbers_stand_in_the_table_below_it(dear, tmp_path):
     assert f"ours is the cheapest in {wins}" in text
 
 
-def test_noise_is_said_beside_the_number_it_spoils(tmp_path):
+def test_noise_is_said_beside_the_number_it_spoils():
     found = results(scenes=("calm",), engines=("ours", "other"))
     assert "noisy" not in answer(found)
     noisy = with_timings(found, step_spread=0.4)
     assert f"other takes 50{TIMES} as long (noisy)." in answer(noisy)
-    assert f"≤ 2 ms ? (50{TIMES})" in section(page_of(noisy, tmp_path), "The answer")
+    assert f"≤ 2 ms ? (50{TIMES})" in section(page_of(noisy), "The answer")
 
 
 @pytest.mark.parametrize("engine", ["ours", "other"])
@@ -493,7 +492,8 @@ PARTIAL = {
 @pytest.mark.parametrize("changes", PARTIAL.values(), ids=PARTIAL)
 def test_partial_results_are_reported(changes, tmp_path):
     found = results(**changes)
-    page = page_of(found, tmp_path)
+    write_report(Report(found), tmp_path)
+    page = (tmp_path / "report.md").read_text("utf-8")
     assert "## Appendix: where the numbers come from" in page
     for plot in re.findall(r"\((plots/[^)]*)\)", page):
         assert (tmp_path / plot).is_file()
@@ -503,7 +503,7 @@ def test_partial_results_are_reported(changes, tmp_path):
 
 
 def test_where_all_failed_every_table_says_so(tmp_path):
-    page = page_of(results(scenes=("calm",), failing=True), tmp_path)
+    page = page_of(results(scenes=("calm",), failing=True))
     assert "none measured (error)" in section(page, "Scene calm")
     assert "14 cases of 14 did not end well" in section(page, "What was refused, and what failed")
     assert "the truth of calm: **timed out**: too slow" in section(page, "What was refused, and what failed")

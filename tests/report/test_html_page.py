@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import pytest
 from markdown_it import MarkdownIt
 
 from pendbench.report.html_page import html_page
 from pendbench.report.index import write_index
-from pendbench.report.plots import Drawn
 from pendbench.report.write import write_report
 from support.browser import Visit, browser, small_stage
 from support.report_data import HOSTILE, report
@@ -37,6 +37,10 @@ More.
 """
 
 
+#: Stands for one that is drawn.
+PLOT = SimpleNamespace(png=b"png", chart=None)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("report")
@@ -53,7 +57,7 @@ def chromium():
 @pytest.fixture
 def visit(chromium, tmp_path):
     path = tmp_path / "report.html"
-    path.write_text(html_page(SHORT, "One, then two.", {"plots/plot.png": Drawn(b"png")}), "utf-8")
+    path.write_text(html_page(SHORT, "One, then two.", {"plots/plot.png": PLOT}), "utf-8")
     seen = Visit(chromium, path)
     yield seen
     assert seen.complaints == []
@@ -164,7 +168,7 @@ def test_an_index_lists_the_reports_of_a_folder(chromium, folder, tmp_path):
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
     path = tmp_path_factory.mktemp("moving") / "report.html"
-    path.write_text(html_page(SHORT, "One, then two.", {"plots/plot.png": Drawn(b"png")}, small_stage()), "utf-8")
+    path.write_text(html_page(SHORT, "One, then two.", {"plots/plot.png": PLOT}, small_stage()), "utf-8")
     return path
 
 

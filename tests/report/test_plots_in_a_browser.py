@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from pendbench.report.charts import Mark, chart_of
 from pendbench.report.html_page import html_page
-from pendbench.report.plots import draw, logarithmic
+from pendbench.report.plots import Drawn, logarithmic
 from support.browser import Visit, browser
 
 X = np.linspace(0.0, 10.0, 101)
@@ -43,7 +43,9 @@ def bars():
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     path = tmp_path_factory.mktemp("plots") / "report.html"
-    path.write_text(html_page(PAGE, "One.", {"plots/one.png": draw(two_panels), "plots/bars.png": draw(bars)}), "utf-8")
+    path.write_text(
+        html_page(PAGE, "One.", {"plots/one.png": Drawn(two_panels), "plots/bars.png": Drawn(bars)}), "utf-8"
+    )
     return path
 
 

@@ -18,7 +18,7 @@ from pendbench.base.source import surroundings
 from pendbench.commands.releases import STEP_S, WINDOW_S, Release
 from pendbench.report.columns import Column, Table, text_column
 from pendbench.report.html_page import html_page
-from pendbench.report.plots import Picture, draw
+from pendbench.report.plots import Drawn, Picture
 from pendbench.report.releases import Point, history_figure
 from pendbench.report.tables import csv_text
 from pendbench.report.template import render, render_block
@@ -162,7 +162,7 @@ class History:
         ]  # fmt: skip
         if not points:
             return []
-        drawn = draw(lambda: history_figure(self.engine, [each.version for each in self.releases], points))
+        drawn = Drawn(lambda: history_figure(self.engine, [each.version for each in self.releases], points))
         said = f"Error and energy up to {WINDOW_S:g} s at a step of {STEP_S:g} s, the largest stable step, and the cost"
         return [Picture("history", "", f"{said} of a step, by release.", drawn)]
 

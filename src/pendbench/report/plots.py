@@ -6,6 +6,7 @@ import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
 from pendbench.report.charts import Chart, chart_of
@@ -29,10 +30,28 @@ HUES: Final = len(_HUES)
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure as a picture, PNG, and as lines that a page draws again, where it has nothing but lines."""
+    """What `figure_of` draws, when somebody first looks, in the library's own style whatever the user's is."""
 
-    png: bytes
-    chart: Chart | None = None
+    figure_of: Callable[[], Figure]
+
+    @property
+    def png(self) -> bytes:
+        """The figure as a picture."""
+        return self._both[0]
+
+    @property
+    def chart(self) -> Chart | None:
+        """The figure as lines that a page draws again, where it has nothing but lines."""
+        return self._both[1]
+
+    @cached_property
+    def _both(self) -> tuple[bytes, Chart | None]:
+        import matplotlib.style
+
+        with matplotlib.style.context("default"):
+            figure, file = self.figure_of(), io.BytesIO()
+            figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
+            return file.getvalue(), chart_of(figure)
 
 
 @dataclass(frozen=True)
@@ -48,16 +67,6 @@ class Picture:
     def png(self) -> bytes:
         """The picture itself."""
         return self.drawn.png
-
-
-def draw(figure_of: Callable[[], Figure]) -> Drawn:
-    """The figure that `figure_of` makes, in the library's own style whatever the user's is."""
-    import matplotlib.style
-
-    with matplotlib.style.context("default"):
-        figure, file = figure_of(), io.BytesIO()
-        figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
-        return Drawn(file.getvalue(), chart_of(figure))
 
 
 def hue(index: int) -> str:

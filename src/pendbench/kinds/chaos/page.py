@@ -19,7 +19,7 @@ from pendbench.measures.energy import conserves_energy
 from pendbench.report.columns import Table
 from pendbench.report.curves import curves_figure
 from pendbench.report.names import in_one_scene, in_order, is_ok, scene_of
-from pendbench.report.plots import Picture, draw
+from pendbench.report.plots import Drawn, Picture
 from pendbench.report.start import turns_at_start
 from pendbench.report.styles import Styles
 from pendbench.report.text import file_name
@@ -126,7 +126,7 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
     regular = [row for row in moving if not row.scene.exponent.chaotic]
     for name, caption, own, gain in (("cost", _COST, chaotic, TIME), ("cost_regular", _COST_REGULAR, regular, ERROR)):
         if any(map(gain.is_drawn, own)):
-            yield Picture(name, "", caption, draw(partial(cost_figure, styles, own, gain)))
+            yield Picture(name, "", caption, Drawn(partial(cost_figure, styles, own, gain)))
     for part in _parts(list(tables["scenes"]), cases):
         scene = part.row.scene.name
         curves = [row for row in tables["curves"] if scene_of(row) == scene]
@@ -134,5 +134,5 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
             canvas, drawn = of(part.row, part.cases, curves)
             if drawn:
                 names.add(name := file_name(f"{kind}_{scene}", names))
-                image = draw(partial(curves_figure, styles, drawn, canvas))
+                image = Drawn(partial(curves_figure, styles, drawn, canvas))
                 yield Picture(name, scene, f"{scene}: {caption}", image)

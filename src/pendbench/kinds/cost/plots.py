@@ -19,7 +19,7 @@ from pendbench.kinds.cost.study import Found
 from pendbench.report.columns import Table
 from pendbench.report.names import distinct, engine_of, finite, grouped, is_ok, method_name, scene_of
 from pendbench.report.numbers import number_text
-from pendbench.report.plots import GREY, Drawn, Picture, bounds, draw, logarithmic, named_panels
+from pendbench.report.plots import GREY, Drawn, Picture, bounds, logarithmic, named_panels
 from pendbench.report.styles import ENDED, Styles, name_missing
 from pendbench.report.text import file_name, label
 from pendbench.study.case import Case
@@ -54,11 +54,11 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
     styles, names = Styles.of_cases(series.case for series in every), set[str]()
     for scene, own in grouped(every, scene_of).items():
         if any(math.isfinite(row.run.error_max) for series in own for row in series.rows):
-            yield _picture(WORK, scene, scene, names, draw(partial(work_figure, styles, scene, own)))
-            yield _picture(STEPS, scene, scene, names, draw(partial(steps_figure, styles, scene, own)))
+            yield _picture(WORK, scene, scene, names, Drawn(partial(work_figure, styles, scene, own)))
+            yield _picture(STEPS, scene, scene, names, Drawn(partial(steps_figure, styles, scene, own)))
     for scene, rows in grouped(tables["long_runs"].rows, scene_of).items():
         if any(_energies(row)[0] for row in rows):
-            yield _picture(LONG, scene, "", names, draw(partial(long_figure, scene, rows)))
+            yield _picture(LONG, scene, "", names, Drawn(partial(long_figure, scene, rows)))
 
 
 def _picture(kind: str, scene: str, section: str, names: set[str], drawn: Drawn) -> Picture:

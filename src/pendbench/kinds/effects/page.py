@@ -16,7 +16,7 @@ from pendbench.kinds.effects.study import ALL, BARE, DEFAULTS, Found, Priced
 from pendbench.report.columns import ORDER_CLAIMED, ORDER_OBSERVED, Table
 from pendbench.report.names import distinct, engine_of, finest, finite, grouped, in_one_scene, is_ok, pair_of, scene_of
 from pendbench.report.numbers import number_text
-from pendbench.report.plots import Picture, draw
+from pendbench.report.plots import Drawn, Picture
 from pendbench.report.sections import status_text
 from pendbench.report.styles import Styles
 from pendbench.report.text import Safe, grid, markdown
@@ -166,7 +166,7 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
         caption = (
             "The cost of a step with one effect at a time, over that of the chain under gravity alone; hollow: noisy."
         )
-        yield Picture("prices", "", caption, draw(partial(price_figure, prices)))
+        yield Picture("prices", "", caption, Drawn(partial(price_figure, prices)))
     measured = [row for row in tables["cases"] if row.run.balance_error > 0 and row.run.error_max > 0]
     if measured:
         caption = "The energy's balance against the error, each mark a scene and a step. An effect simulated "
@@ -175,5 +175,5 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
             "balance",
             "",
             caption,
-            draw(partial(balance_figure, Styles.of_cases(row.case for row in measured), measured)),
+            Drawn(partial(balance_figure, Styles.of_cases(row.case for row in measured), measured)),
         )

@@ -13,7 +13,7 @@ from pendbench.kinds.ensemble.study import Found, is_ours
 from pendbench.measures.flips import edge_of
 from pendbench.report.columns import Table
 from pendbench.report.names import engine_of, grouped, pair_of
-from pendbench.report.plots import Picture, draw
+from pendbench.report.plots import Drawn, Picture
 from pendbench.study.results import Results
 
 
@@ -84,7 +84,7 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
         f"The time until a double pendulum released at rest first goes over the top, {len(flips)} x {len(flips)} "
         "releases; white: not within the scene's duration."
     )
-    yield Picture("map", "", caption, draw(partial(map_figure, flips, duration)))
+    yield Picture("map", "", caption, Drawn(partial(map_figure, flips, duration)))
     others = grouped((row for row in tables["pixels"] if not is_ours(row.case)), lambda row: row.case)
     if others:
         edge = edge_of(flips, results.options.changed * duration)
@@ -92,8 +92,8 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
             "The map, pale, with its edge shaded: where other methods have another time than the finest tolerance."
         )
         figure = partial(differences_figure, flips, duration, edge, list(others.values()))
-        yield Picture("differences", "", caption, draw(figure))
+        yield Picture("differences", "", caption, Drawn(figure))
     if len(tables["exponents"]):
         caption = "The largest Lyapunov exponent of releases at rest against their energy."
         figure = partial(exponents_figure, list(tables["energies"]), list(tables["exponents"]))
-        yield Picture("exponents", "", caption, draw(figure))
+        yield Picture("exponents", "", caption, Drawn(figure))

@@ -12,7 +12,7 @@ from pendbench.kinds.judge.study import Found
 from pendbench.kinds.judge.work import MAGNIFIED
 from pendbench.report.columns import Table
 from pendbench.report.names import engine_of, grouped, scene_of
-from pendbench.report.plots import Picture, draw
+from pendbench.report.plots import Drawn, Picture
 from pendbench.report.styles import Styles
 from pendbench.report.text import file_name
 from pendbench.study.case import Case
@@ -106,4 +106,4 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
     for scene, own in grouped(rows, scene_of).items():
         taken.append(file_name(f"errors_{scene}", taken))
         caption = "The largest error against the step, for methods with a fixed step; ringed: what is recommended."
-        yield Picture(taken[-1], scene, caption, draw(partial(error_figure, styles, own, results.found.goal)))
+        yield Picture(taken[-1], scene, caption, Drawn(partial(error_figure, styles, own, results.found.goal)))

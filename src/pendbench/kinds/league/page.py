@@ -13,7 +13,7 @@ from pendbench.kinds.league.study import LEAVES, OWN, Found
 from pendbench.kinds.league.verdicts import STANDARD
 from pendbench.report.columns import Table
 from pendbench.report.names import distinct, grouped, in_one_scene
-from pendbench.report.plots import Picture, draw
+from pendbench.report.plots import Drawn, Picture
 from pendbench.report.styles import Styles
 from pendbench.study.case import Case
 from pendbench.study.results import Results
@@ -110,4 +110,4 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
         "the largest error of the early part of each scene against the cost of a second. Crosses: each engine as it "
         "comes. Filled: the coarsest step of each of its methods that is accurate enough."
     )
-    yield Picture("cost", "", caption, draw(partial(cost_figure, styles, scenes, rows, results.options.error)))
+    yield Picture("cost", "", caption, Drawn(partial(cost_figure, styles, scenes, rows, results.options.error)))

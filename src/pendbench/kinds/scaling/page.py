@@ -28,7 +28,7 @@ from pendbench.measures.orders import Growth
 from pendbench.measures.titles import TITLES, Title
 from pendbench.report.columns import DT, Column, Table, text_column
 from pendbench.report.names import engine_of, finite, grouped, is_ok, pair_of
-from pendbench.report.plots import Picture, draw
+from pendbench.report.plots import Drawn, Picture
 from pendbench.report.styles import Styles
 from pendbench.report.tables import cross_table
 from pendbench.report.text import Safe, markdown
@@ -141,11 +141,11 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
     if held:
         caption = "The longest chain with which each engine and method wins each title in real time. "
         caption += "Hatched: at least as long."
-        yield Picture("longest", "", caption, draw(partial(longest_figure, _styles(held), held)))
+        yield Picture("longest", "", caption, Drawn(partial(longest_figure, _styles(held), held)))
     timed = [row for row in tables["cases"] if row.timing.step_us > 0]
     if timed:
         caption = "The cost of a step for each link against the number of links. Level: the cost grows like the chain."
-        yield Picture("cost", "", caption, draw(partial(cost_figure, _styles(timed), timed)))
+        yield Picture("cost", "", caption, Drawn(partial(cost_figure, _styles(timed), timed)))
 
 
 def _styles(rows: Sequence[LongestRow] | Sequence[CaseRow]) -> Styles:

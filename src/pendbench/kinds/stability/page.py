@@ -17,7 +17,7 @@ from pendbench.measures.verdict import BREAKS, HOLDS, VERDICTS
 from pendbench.report.columns import Table
 from pendbench.report.names import distinct, engine_of, finite, grouped, pair_of, scene_of
 from pendbench.report.numbers import number_text, times_text
-from pendbench.report.plots import Picture, draw
+from pendbench.report.plots import Drawn, Picture
 from pendbench.report.styles import Styles
 from pendbench.report.tables import cross_table
 from pendbench.report.text import Safe, markdown
@@ -109,10 +109,10 @@ def pictures(results: Results[Found], tables: dict[str, Table]) -> Iterator[Pict
     if not steps:
         return
     caption = "Scene by engine and method: the best verdict of all steps, and the largest step that holds, s."
-    yield Picture("map", "", caption, draw(partial(map_figure, steps)))
+    yield Picture("map", "", caption, Drawn(partial(map_figure, steps)))
     own = [row for row in steps if scene_of(row) in results.options.lengths and row.stable_dt > 0]
     if len(distinct(own, scene_of)) > 1:
         caption = "The largest stable step against the number of links, in one chain of the same length and mass. "
         caption += "Hollow: a lower bound."
         styles = Styles.of_cases(row.case for row in own)
-        yield Picture("growth", "", caption, draw(partial(growth_figure, styles, own)))
+        yield Picture("growth", "", caption, Drawn(partial(growth_figure, styles, own)))
