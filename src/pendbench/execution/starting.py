@@ -15,12 +15,11 @@ from typing import Any, Final
 
 from pendbench.base.processes import THREAD_VARIABLES
 
-_LOADED: Final = "pendbench.execution.loaded"
-#: How the variables begin that are looked at while that is loaded, and never again; but a copy is told where to import
-#: from.
-_READ_ONCE: Final = ("NUMBA_", "PYTHON", *THREAD_VARIABLES)
-_TOLD: Final = "PYTHONPATH"
+#: How the variables begin that libraries and kernels look at as they are loaded, and never again.
+_READ_ONCE: Final = ("NUMBA_", "PYTHON", "XDG_CACHE_HOME", "HOME", *THREAD_VARIABLES)
+_TOLD: Final = "PYTHONPATH"  # a copy is told where to import from
 
+_loaded: list[str] = ["pendbench.execution.loaded"]  # the modules that are loaded before a process is copied
 _read: dict[str, str] | None = None  # those variables, as they were when the process that is copied was started
 
 
@@ -47,6 +46,11 @@ class AsCopies(_KeepingLocks, ForkServerContext):
     """Starts processes as copies of one that has loaded what they need."""
 
 
+def load_before(module: str) -> None:
+    """Have a module loaded before processes are copied: one that the jobs of most pools need."""
+    _loaded.append(module)
+
+
 def way_to_start() -> FromNothing | AsCopies:
     """How a pool's processes start now: a copy would not know what has changed since in the variables read there."""
     global _read  # noqa: PLW0603
@@ -54,7 +58,7 @@ def way_to_start() -> FromNothing | AsCopies:
         return FromNothing()
     now = {name: value for name, value in os.environ.items() if name.startswith(_READ_ONCE) and name != _TOLD}
     if _read is None:
-        get_context("forkserver").set_forkserver_preload([_LOADED])
+        get_context("forkserver").set_forkserver_preload(_loaded)
         _read = now
     return AsCopies() if now == _read else FromNothing()
 
