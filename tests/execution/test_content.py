@@ -210,8 +210,8 @@ def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypa
 
 def test_the_installed_packages_are_read_once_for_all_engines_until_something_is_installed(monkeypatch, tmp_path):
     read = []
-    whole = fingerprints.metadata.packages_distributions
-    monkeypatch.setattr(fingerprints.metadata, "packages_distributions", lambda: read.append(1) or whole())
+    whole = fingerprints.metadata.distributions
+    monkeypatch.setattr(fingerprints.metadata, "distributions", lambda: read.append(1) or whole())
     monkeypatch.syspath_prepend(tmp_path)
     for library in ("numpy", "scipy"):
         assert list(fingerprints._parts(library))

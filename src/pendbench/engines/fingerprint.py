@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cache
 from importlib import metadata
 from importlib.util import find_spec
+from operator import itemgetter
 from pathlib import Path
 
 from pendbench.engines.registry import engine
@@ -36,10 +38,14 @@ def installed() -> tuple[tuple[str, int], ...]:
 
 
 @cache
-def _distributions(where: tuple[tuple[str, int], ...]) -> Mapping[str, list[str]]:
-    """The distributions of each top-level package, for what is installed now: to read all of them takes 0.2 s."""
+def _records(where: tuple[tuple[str, int], ...]) -> tuple[tuple[metadata.Distribution, str], ...]:
+    """Every distribution that has a record of its files, with that record, for what is installed now.
+
+    importlib.metadata's own table of packages takes five times as long.
+    """
     del where
-    return metadata.packages_distributions()
+    records = ((each, each.read_text("RECORD")) for each in metadata.distributions())
+    return tuple((each, record) for each, record in records if record)
 
 
 @cache
@@ -59,10 +65,10 @@ def _parts(library: str) -> Iterator[bytes]:
         return
     if spec is None:
         return
-    names = _distributions(installed()).get(library, [])
-    records = [_record(distribution) for distribution in sorted(names)]
-    if records and all(records):
-        yield from (record.encode() for record in records if record)
+    holds = re.compile(rf"^{re.escape(library)}[/.]", re.MULTILINE)
+    found = [(each.name, each, record) for each, record in _records(installed()) if holds.search(record)]
+    if found and not any(_is_editable(each) for _, each, _ in found):
+        yield from (record.encode() for _, _, record in sorted(found, key=itemgetter(0)))
         return
     folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
     files = {file for folder in folders for file in folder.rglob("*") if file.suffix != ".pyc" and file.is_file()}
@@ -71,10 +77,7 @@ def _parts(library: str) -> Iterator[bytes]:
         yield file.read_bytes()
 
 
-def _record(name: str) -> str | None:
-    """The hashes of a distribution's files, or None where they do not tell what is run."""
-    distribution = metadata.distribution(name)
+def _is_editable(distribution: metadata.Distribution) -> bool:
+    """Whether it is installed from a folder where it is worked on: then its record does not tell what is run."""
     source = json.loads(distribution.read_text("direct_url.json") or "{}")
-    if source.get("dir_info", {}).get("editable"):
-        return None
-    return distribution.read_text("RECORD")
+    return bool(source.get("dir_info", {}).get("editable"))
