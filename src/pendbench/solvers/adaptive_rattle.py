@@ -91,15 +91,15 @@ def begin(q: FloatArray, v: FloatArray) -> State:
 
 
 @inlined
-def _extrapolate_forces(rows: Rows, fallen: FloatArray, last: float, before: float, older: float) -> None:
-    """The next multipliers, by the parabola through the last three, `last` s after them; the oldest go to `fallen`."""
+def _extrapolate_forces(rows: Rows, last: float, before: float, older: float) -> None:
+    """The next multipliers, by the parabola through the last three, `last` s after them; the oldest are kept aside."""
     to_before, to_older = last + before, last + before + older
     share, share_before, share_older = 1.0, 0.0, 0.0
     if before > 0.0 and older > 0.0:
         share = to_before * to_older / (before * (before + older))
         share_before = -last * to_older / (before * older)
         share_older = last * to_before / ((before + older) * older)
-    force, force_before, force_older = rows.force, rows.force_before, rows.force_older
+    force, force_before, force_older, fallen = rows.force, rows.force_before, rows.force_older, rows.spare_x
     for i in range(len(force)):
         extrapolated = share * force[i] + share_before * force_before[i] + share_older * force_older[i]
         fallen[i], force_older[i] = force_older[i], force_before[i]
@@ -107,19 +107,20 @@ def _extrapolate_forces(rows: Rows, fallen: FloatArray, last: float, before: flo
 
 
 @inlined
-def _forget_forces(rows: Rows, fallen: FloatArray) -> None:
+def _forget_forces(rows: Rows) -> None:
     """Go back to before that."""
+    force, force_before, force_older, fallen = rows.force, rows.force_before, rows.force_older, rows.spare_x
     for i in range(len(fallen)):
-        rows.force[i], rows.force_before[i], rows.force_older[i] = rows.force_before[i], rows.force_older[i], fallen[i]
+        force[i], force_before[i], force_older[i] = force_before[i], force_older[i], fallen[i]
 
 
 @inlined
-def _turn(rows: Rows, spare: FloatArray) -> float:
+def _turn(rows: Rows) -> float:
     """By how much the new rods have turned, rad: the eighth root of the sum of eighth powers.
 
     The sum is folded in halves: one that runs from end to end does not run in vector registers.
     """
-    n = len(rows.off)
+    n, spare = len(rows.off), rows.spare_y
     for i in range(n):
         x, y = rows.new_x[i] - rows.x[i + 1], rows.new_y[i] - rows.y[i + 1]
         square = rows.inverse_square[i] * (x * x + y * y)
@@ -134,7 +135,7 @@ def _turn(rows: Rows, spare: FloatArray) -> float:
 
 
 @inlined
-def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: FloatArray) -> float:
+def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float) -> float:
     """The length of the next step, s, with multipliers that close it; leaves the new rods. 0 where none are found."""
     last, falling = steps[_LAST], rows.speed_y[0]
     h: float = min(steps[_NEXT], longest)
@@ -149,7 +150,7 @@ def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: 
             eliminate(chain, rows, h * between)
             again = rough > 0
         if iteration > 0 and rough == 0 and not followed:
-            share = _turn(rows, spare) / TURN
+            share = _turn(rows) / TURN
             change = 1.0 / np.hypot(h / longest, share)
             if change * _GROWTH < 1.0:
                 break
@@ -162,7 +163,7 @@ def _closes(chain: Chain, rows: Rows, steps: FloatArray, longest: float, spare: 
 
 
 @inlined
-def _step(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArray) -> float:
+def _step(chain: Chain, rows: Rows, steps: FloatArray, dt: float) -> float:
     """The length of the next step, s, that leaves the new rods; 0 where even the finest does not close.
 
     Multipliers can close a step on another motion than the one they come from, that turns rods by far more than asked.
@@ -170,8 +171,8 @@ def _step(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArr
     falling, finest = rows.speed_y[0], dt / FINEST
     while steps[_NEXT] >= finest:
         longest = dt / steps[_PARTS]
-        _extrapolate_forces(rows, room[8], steps[_LAST], steps[_BEFORE], steps[_OLDER])
-        h = _closes(chain, rows, steps, longest, room[9])
+        _extrapolate_forces(rows, steps[_LAST], steps[_BEFORE], steps[_OLDER])
+        h = _closes(chain, rows, steps, longest)
         tried = h if h > 0.0 else min(steps[_NEXT], longest)
         rests = tried > _AT_REST * longest
         if h >= finest and turns_within(rows, _FURTHEST):
@@ -179,7 +180,7 @@ def _step(chain: Chain, rows: Rows, steps: FloatArray, dt: float, room: FloatArr
             if pulls_within(chain.couplings, rows.force, (most / h) ** 2):
                 return h
         rows.speed_y[0] = falling
-        _forget_forces(rows, room[8])
+        _forget_forces(rows)
         steps[_PARTS] *= 2.0 if rests else 1.0
         steps[_NEXT] = 0.5 * min(steps[_NEXT], tried)
     return 0.0
@@ -197,13 +198,13 @@ def _run(
     prepare_rows(chain, rows)
     while True:
         falling, last = rows.speed_y[0], steps[_LAST]
-        h = _step(chain, rows, steps, dt, room)
+        h = _step(chain, rows, steps, dt)
         if h == 0.0:
             return False
         if steps[_TIME] + h > end:
             rows.speed_y[0] = falling
             copy_rows(memory, aside)
-            _forget_forces(rows, room[8])
+            _forget_forces(rows)
             return True
         accept(rows, h)
         steps[_NEXT] = h * min(max(h / last, 1.0 / _CHANGE), _CHANGE) if last > 0.0 else h
@@ -212,9 +213,10 @@ def _run(
 
 
 @inlined
-def _accept_by_kick(chain: Chain, rows: Rows, room: FloatArray, h: float, between: float) -> None:
+def _accept_by_kick(chain: Chain, rows: Rows, h: float, between: float) -> None:
     """Go on from the new rods; their speeds by what changed them, since over a short step differences are rounding."""
-    couplings, force, x, y, new_speed_x, new_speed_y = chain.couplings, rows.force, rows.x, rows.y, room[8], room[9]
+    couplings, force, x, y = chain.couplings, rows.force, rows.x, rows.y
+    new_speed_x, new_speed_y = rows.spare_x, rows.spare_y
     for i in range(len(rows.off)):
         own, out, back = pulls(couplings, force, i, between)
         new_speed_x[i] = rows.speed_x[i] + own * x[i + 1] - out * x[i + 2] - back * x[i]
@@ -240,7 +242,7 @@ def _look(chain: Chain, memory: FloatArray, aside: FloatArray, room: FloatArray,
             rows.speed_y[0] -= between * chain.gravity
             if not closes(chain, rows, h, h * between, 1) or not turns_within(rows, _FURTHEST):
                 break
-            _accept_by_kick(chain, rows, room, h, between)
+            _accept_by_kick(chain, rows, h, between)
             before, taken = h, taken + 1
         if taken == parts:
             return h

@@ -39,7 +39,8 @@ TURN = 2.0 * np.pi
 _NEAR, _SMALL, _FAR = 1e-2, 0.5, 2.0
 
 # The rows of `Room.rows`: see there.
-WANTED_X, WANTED_Y, ANGLE, PULL, ROD_Y, ROD_X, ALONG_Y, ALONG_X, FORCE_X, FORCE_Y, SPARE, GUESS = range(12)
+ROWS = 12
+WANTED_X, WANTED_Y, ANGLE, PULL, ROD_Y, ROD_X, ALONG_Y, ALONG_X, FORCE_X, FORCE_Y, SPARE, GUESS = range(ROWS)
 
 # What is kept of a rod: the inverse matrix (2, 2), the right side, and the two factors that turn it into an angle.
 _KEPT = 8
@@ -61,7 +62,7 @@ def chain_of(masses: FloatArray, lengths: FloatArray, gravity: float) -> Chain:
 class Room(NamedTuple):
     """Where a step is computed. One thread, one chain.
 
-    rows (12, n + 2): WANTED, what a rod would be without pulls, m; ANGLE, rad, and PULL, kg m: the guess, then the
+    rows (ROWS, n + 2): WANTED, what a rod would be without pulls, m; ANGLE, rad, and PULL, kg m: the guess, then the
     answer; ROD and ALONG, unit vectors of the rods and of their pulls; FORCE, kg m, of rod i at place i + 1, with 0 at
     both ends; SPARE, and GUESS of the angles. kept (n, 8).
     """
@@ -72,7 +73,7 @@ class Room(NamedTuple):
 
 def room_for(n: int) -> Room:
     """Room for n rods."""
-    return Room(np.zeros((12, n + 2)), np.empty((n, _KEPT)))
+    return Room(np.zeros((ROWS, n + 2)), np.empty((n, _KEPT)))
 
 
 @inlined

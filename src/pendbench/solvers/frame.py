@@ -29,7 +29,7 @@ from pendbench.solvers.closing import Chain
 from pendbench.solvers.copying import copy_rows
 from pendbench.solvers.methods import FixedStep, Form, add
 from pendbench.solvers.multipliers import guess_forces, rows_of
-from pendbench.solvers.rattle import FINEST, State, begin, take_steps, write_start, write_state
+from pendbench.solvers.rattle import FINEST, LAST, PARTS, State, begin, take_steps, write_start, write_state
 
 #: A frame that asks for more steps than this is given up.
 MOST_SUBSTEPS = FINEST
@@ -40,21 +40,21 @@ LONGEST = 0.4
 
 @inlined
 def _frame(chain: Chain, memory: FloatArray, kept: FloatArray, steps: FloatArray, room: FloatArray, dt: float) -> bool:
-    """Take a frame of dt s in `steps[1]` steps, or in twice as many as often as it takes; else undo all.
+    """Take a frame of dt s in `steps[PARTS]` steps, or in twice as many as often as it takes; else undo all.
 
-    kept (8, n + 2): room for that.
+    kept (KEPT, n + 2): room for that.
     """
     copy_rows(memory, kept)
-    before = steps[0]
+    before = steps[LAST]
     while True:
-        h, count = dt / steps[1], int(steps[1])
+        h, count = dt / steps[PARTS], int(steps[PARTS])
         if take_steps(chain, memory, steps, room, h, count, np.inf, (LONGEST / h) ** 2) == count:
             return True
         copy_rows(kept, memory)
-        steps[0] = before
-        if 2.0 * steps[1] > MOST_SUBSTEPS:
+        steps[LAST] = before
+        if 2.0 * steps[PARTS] > MOST_SUBSTEPS:
             return False
-        steps[1] *= 2.0
+        steps[PARTS] *= 2.0
         rows = rows_of(memory, room, len(chain.lengths))
         guess_forces(rows, rows.force)
 

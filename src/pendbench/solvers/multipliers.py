@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import inlined
-from pendbench.solvers.closing import Chain
+from pendbench.solvers.closing import ROWS, Chain
 
 MOST_ITERATIONS = 12
 CLOSE = 1e-12  # how far a rod may be from its length, relative to it
@@ -20,13 +20,20 @@ _SMALL, _LARGE = 1e-20, 1e20  # between these, determinants need not be reduced
 _LINKS_BETWEEN = 8  # two looks at that: a link makes them twice as large at most, and smaller by its pivot
 
 
+# The rows of a memory and of a room: see `Rows`. Every room of these has as many as one of `closing`.
+KEPT = 8
+X, Y, FORCE, FORCE_BEFORE, FORCE_OLDER, SPEED_X, SPEED_Y, TURNS = range(KEPT)
+NEW_X, NEW_Y, INVERSE_SQUARE, INERTIA, OFF, BELOW, ABOVE, SHARE, SPARE_X, SPARE_Y, PRODUCT, DETERMINANT = range(ROWS)
+
+
 class Rows(NamedTuple):
     """The rods, m, and their multipliers now and in the two steps before, N/m, (n + 2,) from place 1 on; their speeds,
     m/s, and how often each went over the top, counter-clockwise positive, (n,).
 
     In the room, (n,): the new rods, m; 1 / l^2; 1 / (c_i + c_(i+1)), kg; how far new rods are from their lengths, over
     l; and the matrix of the changes of that, over k (c_i + c_(i+1)) and eliminated: what neighbours add to a
-    multiplier, what a right side is multiplied by, determinants; (n + 1,): the two off the diagonal, multiplied.
+    multiplier, what a right side is multiplied by, determinants; (n + 1,): the two off the diagonal, multiplied;
+    (n + 2,): two to spare.
     """
 
     x: FloatArray
@@ -47,15 +54,36 @@ class Rows(NamedTuple):
     share: FloatArray
     determinant: FloatArray
     product: FloatArray
+    spare_x: FloatArray
+    spare_y: FloatArray
 
 
 @inlined
 def rows_of(memory: FloatArray, room: FloatArray, n: int) -> Rows:
     """The rows of n rods by their names."""
     m, s, wide = memory, room, n + 2
-    kept = (m[0, :wide], m[1, :wide], m[2, :wide], m[3, :wide], m[4, :wide], m[5, :n], m[6, :n], m[7, :n])
-    found = (s[0, :n], s[1, :n], s[2, :n], s[3, :n], s[4, :n], s[5, :n], s[6, :n], s[7, :n], s[11, :n], s[10, : n + 1])
-    return Rows(*kept, *found)
+    return Rows(
+        x=m[X, :wide],
+        y=m[Y, :wide],
+        force=m[FORCE, :wide],
+        force_before=m[FORCE_BEFORE, :wide],
+        force_older=m[FORCE_OLDER, :wide],
+        speed_x=m[SPEED_X, :n],
+        speed_y=m[SPEED_Y, :n],
+        turns=m[TURNS, :n],
+        new_x=s[NEW_X, :n],
+        new_y=s[NEW_Y, :n],
+        inverse_square=s[INVERSE_SQUARE, :n],
+        inertia=s[INERTIA, :n],
+        off=s[OFF, :n],
+        below=s[BELOW, :n],
+        above=s[ABOVE, :n],
+        share=s[SHARE, :n],
+        determinant=s[DETERMINANT, :n],
+        product=s[PRODUCT, : n + 1],
+        spare_x=s[SPARE_X, :wide],
+        spare_y=s[SPARE_Y, :wide],
+    )
 
 
 @inlined

@@ -30,10 +30,16 @@ import numpy as np
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.compiled import compiled, inlined, part
-from pendbench.solvers.closing import ROD_X, ROD_Y, SPARE, TURN, Chain
+from pendbench.solvers.closing import ROD_X, ROD_Y, ROWS, SPARE, TURN, Chain
 from pendbench.solvers.methods import FixedStep, Form, add
 from pendbench.solvers.multipliers import (
+    KEPT,
+    SPEED_X,
+    SPEED_Y,
+    TURNS,
     Rows,
+    X,
+    Y,
     closes,
     extrapolate_forces,
     guess_forces,
@@ -59,13 +65,17 @@ _PATIENCE, _RARER = 100, 1.5
 _ONE: Any = np.int64(1)  # of a 1 numba makes a type of its own, and a second kernel
 
 
+#: What is kept in `State.steps`: the length of the last step, s, 0 before the first; into how many parts steps are cut;
+#: how many steps in a row would have allowed fewer, and how many have to (`frame` uses neither).
+LAST, PARTS, CALM, PATIENCE = range(4)
+
+
 class State(NamedTuple):
     """What is kept from step to step.
 
     q, v (n,): angles and rates after the last call. gap (1,): how far the worst rod was from its length then, relative
-    to it. memory (8, n + 2): the rows of `Rows` that are kept. steps (4,): the length of the last step, s, 0 before the
-    first; into how many parts steps are cut; how many steps in a row would have allowed fewer, and how many have to
-    (`frame` uses neither). room (12, n + 2): where steps are computed.
+    to it. memory (KEPT, n + 2): the rows of `Rows` that are kept. steps (4,): see LAST. room (ROWS, n + 2): where steps
+    are computed.
     """
 
     q: FloatArray
@@ -79,17 +89,17 @@ class State(NamedTuple):
 def begin(q: FloatArray, v: FloatArray) -> State:
     """The state at the start, copied."""
     n = len(q)
-    memory, room = np.zeros((8, n + 2)), np.zeros((12, n + 2))
+    memory, room = np.zeros((KEPT, n + 2)), np.zeros((ROWS, n + 2))
     return State(q.copy(), v.copy(), np.zeros(1), memory, np.array([0.0, 1.0, 0.0, _PATIENCE]), room)
 
 
 def write_start(chain: Chain, state: State) -> None:
     """Before the first step, the rods, their speeds and turns, of the angles and rates."""
-    if state.steps[0] == 0.0:
+    if state.steps[LAST] == 0.0:
         x, y = chain.lengths * np.sin(state.q), -chain.lengths * np.cos(state.q)
-        state.memory[0, 1:-1], state.memory[1, 1:-1] = x, y
-        state.memory[5, :-2], state.memory[6, :-2] = -state.v * y, state.v * x
-        state.memory[7, :-2] = np.round((state.q - np.arctan2(x, -y)) / TURN)
+        state.memory[X, 1:-1], state.memory[Y, 1:-1] = x, y
+        state.memory[SPEED_X, :-2], state.memory[SPEED_Y, :-2] = -state.v * y, state.v * x
+        state.memory[TURNS, :-2] = np.round((state.q - np.arctan2(x, -y)) / TURN)
 
 
 @inlined
@@ -124,7 +134,7 @@ def take_steps(
     rows = rows_of(memory, room, len(chain.lengths))
     prepare_rows(chain, rows)
     for step in range(count):
-        between, falling = 0.5 * (h + steps[0]), rows.speed_y[0]
+        between, falling = 0.5 * (h + steps[LAST]), rows.speed_y[0]
         rows.speed_y[0] -= between * chain.gravity
         extrapolate_forces(rows)
         fast = not closes(chain, rows, h, h * between) or not turns_within(rows, furthest)
@@ -133,7 +143,7 @@ def take_steps(
             guess_forces(rows, rows.force_before)
             return step
         accept(rows, h)
-        steps[0] = h
+        steps[LAST] = h
     return count
 
 
@@ -153,16 +163,16 @@ def _in_parts(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatAr
     """Take a step of dt s in as many parts as it asks for; False where even the finest do not close."""
     left = 1.0
     while left > 0.0:
-        h = dt / steps[1]
+        h = dt / steps[PARTS]
         if take_steps(chain, memory, steps, room, h, _ONE, _FURTHEST, (_LONGEST / h) ** 2) == 1:
-            left -= 1.0 / steps[1]
-        elif steps[1] < FINEST:
-            steps[1], steps[2] = 2.0 * steps[1], 0.0
+            left -= 1.0 / steps[PARTS]
+        elif steps[PARTS] < FINEST:
+            steps[PARTS], steps[CALM] = 2.0 * steps[PARTS], 0.0
         else:
             return False
-    steps[2] = steps[2] + 1.0 if _is_calm(chain, rows, h) else 0.0
-    if steps[2] >= steps[3]:
-        steps[1], steps[2], steps[3] = 0.5 * steps[1], 0.0, _RARER * steps[3]
+    steps[CALM] = steps[CALM] + 1.0 if _is_calm(chain, rows, h) else 0.0
+    if steps[CALM] >= steps[PATIENCE]:
+        steps[PARTS], steps[CALM], steps[PATIENCE] = 0.5 * steps[PARTS], 0.0, _RARER * steps[PATIENCE]
         guess_forces(rows, rows.force)
     return True
 
@@ -177,7 +187,7 @@ def _write_state(chain: Chain, state: State) -> None:
         state.q[i] = np.arctan2(x, -y) + TURN * rows.turns[i]
         state.gap[0] = max(state.gap[0], abs(np.hypot(x, y) / lengths[i] - 1.0))
     between = rows.speed_y[0]
-    rows.speed_y[0] -= 0.5 * state.steps[0] * chain.gravity
+    rows.speed_y[0] -= 0.5 * state.steps[LAST] * chain.gravity
     for i in range(n):
         s[ROD_X, i], s[ROD_Y, i] = rows.x[i + 1] / lengths[i], rows.y[i + 1] / lengths[i]
         s[SPARE, i] = s[ROD_X, i] * rows.speed_x[i] + s[ROD_Y, i] * rows.speed_y[i]
@@ -189,7 +199,7 @@ def _write_state(chain: Chain, state: State) -> None:
 
 def write_state(chain: Chain, state: State) -> None:
     """The same after a call; what no step has changed stays as it was."""
-    if state.steps[0] > 0.0:
+    if state.steps[LAST] > 0.0:
         _write_state(chain, state)
 
 
@@ -198,11 +208,11 @@ def _advance(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatArr
     """Take steps of dt s, and return how many; where not all could be taken, what is left is of no use."""
     rows, taken = rows_of(memory, room, len(chain.lengths)), 0
     while taken < count:
-        if steps[1] == 1.0:
+        if steps[PARTS] == 1.0:
             taken += take_steps(chain, memory, steps, room, dt, count - taken, _FURTHEST, (_LONGEST / dt) ** 2)
         if taken < count:
-            if steps[1] == 1.0:
-                steps[1], steps[2] = 2.0, 0.0
+            if steps[PARTS] == 1.0:
+                steps[PARTS], steps[CALM] = 2.0, 0.0
             if not _in_parts(chain, memory, steps, room, rows, dt):
                 return taken
             taken += 1
