@@ -84,10 +84,8 @@ def test_where_no_process_can_be_started_that_is_one_line(monkeypatch):
         raise OSError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr("pebble.pool.process.launch_process", refuses)
-    with (
-        pytest.raises(InputError, match=r"^worker processes cannot be started: .*temporarily unavailable$"),
-        LocalPool(1),
-    ):
+    told = r"^worker processes cannot be started: .*temporarily unavailable$"
+    with pytest.raises(InputError, match=told), LocalPool(1):
         pass
 
 
@@ -226,6 +224,14 @@ def test_a_function_that_workers_cannot_find_is_an_outcome(pool, monkeypatch):
     assert found["good"].value == 1
 
 
+def test_a_job_can_print_as_much_as_it_likes(capfd):
+    with LocalPool(WORKERS) as pool:
+        found = outcomes(pool, job(does.print_much, key="a"), job(does.print_much, key="b"))
+    assert [found[key].value for key in "ab"] == [1_000_000] * 2
+    printed = capfd.readouterr().out.count("x")
+    assert printed == 2_000_000
+
+
 def test_an_interrupt_is_for_the_main_process_alone(pool):
     assert outcomes(pool, job(does.interrupt_group))["interrupt_group"].value == "went on"
 
@@ -350,22 +356,6 @@ def test_a_script_without_a_guard_is_told_so_in_one_line(tmp_path, name):
     ran = ran_as_script(tmp_path, UNGUARDED[name])
     assert (ran.returncode, ran.stdout, ran.stderr) == (1, "", f"{TOLD}\n")
     assert [path.name for path in tmp_path.iterdir()] == ["script.py"]
-
-
-def test_a_job_can_print_as_much_as_it_likes(tmp_path):
-    text = """
-        from pendbench.execution.pool import Job, LocalPool
-
-        def print_much():
-            print("x" * 1_000_000)
-
-        if __name__ == "__main__":
-            with LocalPool(2) as pool:
-                list(pool.run(Job(key, print_much, (), 60.0) for key in "ab"))
-    """
-    ran = ran_as_script(tmp_path, text)
-    assert (ran.returncode, ran.stderr) == (0, "")
-    assert ran.stdout.count("x") == 2_000_000
 
 
 def test_where_a_guard_cannot_be_told_from_none_the_workers_refuse(tmp_path):

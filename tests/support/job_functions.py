@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-import multiprocessing
 import os
 import signal
 import sys
@@ -26,24 +25,7 @@ def identity(value: object) -> object:
 
 
 def process() -> tuple[int, int]:
-    return os.getpid(), multiprocessing.parent_process().pid
-
-
-def parent_of_this() -> int:
-    """The process that this one was started by, on behalf of whomever."""
-    return os.getppid()
-
-
-def what_the_parent_has_loaded(library: str) -> bool:
-    return library in Path(f"/proc/{os.getppid()}/maps").read_text()
-
-
-def variable_and_folder(name: str) -> tuple[str | None, str]:
-    return os.environ.get(name), os.getcwd()
-
-
-def cache_of_numba() -> str:
-    return numba.config.CACHE_DIR
+    return os.getpid(), os.getppid()
 
 
 def threads_of_arithmetic() -> tuple[str | None, float]:
@@ -208,6 +190,13 @@ def unpicklable_here() -> object:
     return Local()
 
 
+def print_much() -> int:
+    text = "x" * 1_000_000
+    print(text)
+    print(text, file=sys.stderr)
+    return len(text)
+
+
 def interrupt_group() -> str:
     """What Ctrl-C in a terminal does to a worker."""
     os.kill(os.getpid(), signal.SIGINT)
@@ -235,12 +224,12 @@ def meet(folder: str, name: str, others: int) -> int:
 
 
 def parent() -> int:
-    return multiprocessing.parent_process().pid
+    return os.getppid()
 
 
 def kill_parent() -> None:
     """What no pool can guard against: the process that has it goes, too."""
-    os.kill(multiprocessing.parent_process().pid, signal.SIGKILL)
+    os.kill(os.getppid(), signal.SIGKILL)
     time.sleep(600.0)
 
 

@@ -47,17 +47,13 @@ def machine_memory() -> int:
     return int(psutil.virtual_memory().total)
 
 
-_UNGUARDED: Final = 'error: a script that runs a study needs the line `if __name__ == "__main__":` before it'
-
-
 def refuse_without_guard() -> None:
     """Leave where a script starts processes on a line that each of them would run, too.
 
     A worker runs the user's script again to know its functions: the script must not start workers then.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False) or _unguarded():
-        print(_UNGUARDED, file=sys.stderr, flush=True)  # a worker that is a copy of a process ends without a word
-        raise SystemExit(1)
+        raise SystemExit('error: a script that runs a study needs the line `if __name__ == "__main__":` before it')
 
 
 def _unguarded() -> bool:

@@ -17,13 +17,10 @@ from typing import Any, Final, NamedTuple, cast
 from pendbench.base.errors import InputError, MissingEngineError, choose, describe, printable
 from pendbench.base.strict import show
 from pendbench.engines.protocol import Engine, Method
-from pendbench.execution.starting import load_before
 
 GROUP: Final = "pendbench.engines"
 #: The variable that names engines of other environments, so that worker processes inherit it: a JSON object.
 PYTHONS: Final = "PENDBENCH_PYTHONS"
-
-load_before("pendbench.engines.analytic.adapter")  # the truth that all are measured against
 
 Factory = Callable[[], Engine]
 
