@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
+from support.lent_pools import LentPool, end_pools
+
 # In CI the examples are the same at every run, so that what fails there fails here; elsewhere they are new ones.
 settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize="CI" in os.environ
@@ -16,6 +18,16 @@ settings.register_profile(
 settings.load_profile("any machine")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _pools_are_lent() -> Iterator[None]:
+    """Studies, questions and gates in this process have their jobs done by workers that are there."""
+    with pytest.MonkeyPatch.context() as patch:
+        for user in ("commands.run", "engines.gating.gate", "execution.ask"):
+            patch.setattr(f"pendbench.{user}.LocalPool", LentPool)
+        yield
+    end_pools()
 
 
 @pytest.fixture(autouse=True)
