@@ -74,7 +74,6 @@ def read_side(path: str | os.PathLike[str]) -> Results | Gate:
 
 
 def _results(folder: Path) -> Results:
-
     from pendbench.study.case_table import read_cases
     from pendbench.study.changes import DIVERGES, REPRODUCED, TIMES
     from pendbench.study.spreads import SAYING

@@ -120,11 +120,13 @@ def drag_forces(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega: FloatA
 def generalized_forces(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega: FloatArray) -> FloatArray:
     """What joints and air do to each rod's angle, (..., n) N m. equations.md (E40)."""
     joints = joint_torques(scene, t, theta, omega)
-    outer = np.concatenate([joints[..., 1:], np.zeros_like(joints[..., :1])], axis=-1)
-    forces = drag_forces(scene, t, theta, omega)
-    pulled = np.cumsum(forces[..., ::-1, :], axis=-2)[..., ::-1, :]
-    across = np.cos(theta) * pulled[..., 0] + np.sin(theta) * pulled[..., 1]
-    return np.asarray(joints - outer + scene.lengths * across)
+    total = np.array(joints)
+    total[..., :-1] -= joints[..., 1:]
+    if _with(scene, "drag"):
+        forces = drag_forces(scene, t, theta, omega)
+        pulled = np.cumsum(forces[..., ::-1, :], axis=-2)[..., ::-1, :]
+        total += scene.lengths * (np.cos(theta) * pulled[..., 0] + np.sin(theta) * pulled[..., 1])
+    return total
 
 
 def mass_forces(scene: Scene, t: float, theta: FloatArray, omega: FloatArray) -> FloatArray:
