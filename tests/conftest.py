@@ -1,4 +1,4 @@
-"""What holds for every test: numerical errors are loud, plots need no screen, and no machine is too slow."""
+"""What holds for every test: numerical errors are loud, plots need no screen, no machine is too slow, pools wait."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ def _pools_are_lent() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for user in ("commands.run", "engines.gating.gate", "execution.ask"):
             patch.setattr(f"pendbench.{user}.LocalPool", LentPool)
-        yield
-    end_pools()
+        try:
+            yield
+        finally:
+            end_pools()
 
 
 @pytest.fixture(autouse=True)

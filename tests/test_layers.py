@@ -233,6 +233,12 @@ def test_a_worker_loads_no_library_that_its_first_job_may_not_need():
     assert found.stdout.split() == []
 
 
+def test_a_study_on_the_command_line_waits_for_no_table_or_plot():
+    code = "import sys, pendbench.commands.run; print(*sorted({'matplotlib', 'numba', 'pandas'} & set(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == []
+
+
 def test_every_part_named_here_exists():
     named = (
         {part for parts in FLOORS for part in parts} | set(ONLY) | {part for parts in ONLY.values() for part in parts}

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from importlib import import_module
+from pathlib import Path
 from typing import get_type_hints
 
 import numpy as np
@@ -54,6 +55,7 @@ for work in sys.stdin:
         print("caught", flush=True)
     end = 1.0
     exec(work)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     print("still works", flush=True)
 """
 LONG = {
@@ -80,22 +82,24 @@ LONG = {
 
 
 @pytest.fixture(scope="module")
-def children():
-    """The child that does one work after the other, and those before it that crashed."""
-    started = []
-    yield started
-    for child in started:
-        child.kill()
-        child.communicate()
+def children(tmp_path_factory):
+    """The child that does one work after the other, after those that did not come through one; and what all say."""
+    with open(tmp_path_factory.mktemp("children") / "said", "w+", encoding="utf-8") as said:
+        started = []
+        yield started, said
+        for child in started:
+            child.stdin.close()
+            code = child.wait()
+            child.stdout.close()
+            assert code == 0 or child is not started[-1]
 
 
 def child_of(children):
-    if not children or children[-1].poll() is not None:
-        pipe = subprocess.PIPE
-        children.append(
-            subprocess.Popen([sys.executable, "-c", CHILD], stdin=pipe, stdout=pipe, stderr=pipe, text=True)
-        )
-    return children[-1]
+    started, said = children
+    if not started or started[-1].poll() is not None:
+        line, pipe = [sys.executable, "-c", CHILD], subprocess.PIPE
+        started.append(subprocess.Popen(line, stdin=pipe, stdout=pipe, stderr=said, text=True))
+    return started[-1]
 
 
 @pytest.mark.parametrize("work", LONG)
@@ -104,15 +108,16 @@ def test_an_interrupt_is_caught_and_what_it_stopped_can_be_begun_again(children,
     if name in ("mujoco", "pymunk", "pinocchio", "heyoka", "exudyn") and name not in installed_engines():
         pytest.skip(f"{name} is not installed")
     child = child_of(children)
-    print(LONG[work], file=child.stdin, flush=True)
-    said = [child.stdout.readline()]
-    if said == ["ready\n"]:
+    try:
+        print(LONG[work], file=child.stdin, flush=True)
+        answers = [child.stdout.readline()]
         time.sleep(0.3)  # for it to be at work; if it is not yet, it is interrupted all the same
         child.send_signal(signal.SIGINT)
-        said += [child.stdout.readline() for _ in range(2)]
-    if said != ["ready\n", "caught\n", "still works\n"]:
+        answers += [child.stdout.readline() for _ in range(2)]
+        assert answers == ["ready\n", "caught\n", "still works\n"], Path(children[1].name).read_text("utf-8")
+    except BaseException:
         child.kill()
-        pytest.fail(f"{said}: {child.communicate()[1]}")
+        raise
 
 
 def test_no_kernel_that_python_calls_returns_a_named_tuple():

@@ -152,9 +152,9 @@ def test_addresses_are_no_content():
         content(np.array([object()]))
 
 
-def library(folder: Path, body: str) -> None:
-    (folder / "some_engine").mkdir(exist_ok=True)
-    (folder / "some_engine/__init__.py").write_text(body)
+def library(folder: Path, body: str, name: str = "some_engine") -> None:
+    (folder / name).mkdir(exist_ok=True)
+    (folder / name / "__init__.py").write_text(body)
 
 
 ENGINE = """
@@ -185,6 +185,50 @@ def test_an_engine_that_is_worked_on_under_one_version_is_another_engine(tmp_pat
     assert found[0] == found[1] != found[2]
     monkeypatch.setitem(registry._registered, "mine", other)
     assert fingerprints.fingerprint("mine") not in found
+
+
+def distribution(folder: Path, name: str, record: bytes) -> None:
+    about = folder / f"{name}-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Name: {name}\nVersion: 1.0\n")
+    (about / "RECORD").write_bytes(record)
+
+
+def parts(name: str) -> list[bytes]:
+    return list(fingerprints._parts(name))
+
+
+def test_a_library_that_was_installed_is_its_record_and_one_that_is_worked_on_its_files(tmp_path, monkeypatch):
+    site, checkout, record = tmp_path / "site", tmp_path / "checkout", b"an_engine/__init__.py,sha256=abc,9\n"
+    for folder in (site, checkout):
+        folder.mkdir()
+        library(folder, ENGINE, "an_engine")
+    distribution(site, "an-engine", record)
+    distribution(site, "an-engine-more", b"an_engine_more/__init__.py,sha256=def,9\nan_engine.more-1/x,,\n")
+    distribution(site, "of-another-century", b"\xff\xfe,,\n")
+    monkeypatch.syspath_prepend(site)
+    assert parts("an_engine") == [record]
+    monkeypatch.syspath_prepend(checkout)  # an import finds this one now, as it does one that is installed as editable
+    assert parts("an_engine") == [b"__init__.py", ENGINE.encode()]
+
+
+def test_a_library_in_two_places_is_known_by_records_where_both_have_one(tmp_path, monkeypatch):
+    first, second = tmp_path / "first", tmp_path / "second"
+    for folder in (first, second):
+        (folder / "many_engines").mkdir(parents=True)
+        (folder / f"many_engines/{folder.name}.py").write_text(folder.name)
+        monkeypatch.syspath_prepend(folder)
+    distribution(first, "many-first", b"many_engines/first.py,,\n")
+    assert parts("many_engines") == [b"first.py", b"first", b"second.py", b"second"]
+    distribution(second, "many-second", b"many_engines/second.py,,\n")
+    assert parts("many_engines") == [b"many_engines/first.py,,\n", b"many_engines/second.py,,\n"]
+
+
+def test_a_library_of_one_file_is_known_by_its_record(tmp_path, monkeypatch):
+    (tmp_path / "one_engine.py").write_text("")
+    distribution(tmp_path, "one-engine", b"one_engine.py,,\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert parts("one_engine") == [b"one_engine.py,,\n"]
 
 
 def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypatch):

@@ -79,14 +79,20 @@ def test_a_pool_that_cannot_start_leaves_nothing_in_the_environment(monkeypatch)
     del failed  # until here it holds what the pool had begun: nothing was tidied up by chance
 
 
-def test_where_no_process_can_be_started_that_is_one_line(monkeypatch):
-    def refuses(*_: object) -> None:
-        raise OSError(11, "Resource temporarily unavailable")
+def test_where_not_all_processes_can_be_started_that_is_one_line_and_none_stays(monkeypatch):
+    started, launch = [], pebble.pool.process.launch_process
 
-    monkeypatch.setattr("pebble.pool.process.launch_process", refuses)
+    def launch_one(*arguments: object) -> object:
+        if started:
+            raise OSError(11, "Resource temporarily unavailable")
+        started.append(launch(*arguments))
+        return started[0]
+
+    monkeypatch.setattr(pebble.pool.process, "launch_process", launch_one)
     told = r"^worker processes cannot be started: .*temporarily unavailable$"
-    with pytest.raises(InputError, match=told), LocalPool(1):
+    with pytest.raises(InputError, match=told), LocalPool(WORKERS):
         pass
+    assert_gone(started[0].pid)
 
 
 def test_as_many_run_at_once_as_there_are_workers(pool, tmp_path):

@@ -11,6 +11,7 @@ import matplotlib.style
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 
 from pendbench.kinds.chaos import page
 from pendbench.kinds.chaos.plots import TIME, cost_figure, error_curves
@@ -38,6 +39,20 @@ def figures():
             made[picture.name] = picture.drawn.figure_of()
             FigureCanvasAgg(made[picture.name]).draw()
     return made
+
+
+def test_a_figure_is_drawn_once_and_when_somebody_looks():
+    drawn = []
+
+    def figure_of():
+        drawn.append(Figure())
+        return drawn[-1]
+
+    picture = Drawn(figure_of)
+    assert not drawn
+    assert picture.png.startswith(b"\x89PNG")
+    assert picture.chart is None
+    assert len(drawn) == 1
 
 
 def test_there_are_figures_for_each_scene_and_two_for_all(figures):

@@ -342,6 +342,7 @@ def test_scene_in_which_nothing_moves_is_said_to_be_one_and_has_no_price():
     assert report.answer.startswith("Nothing moves in calm: it starts at rest, and nothing pulls it.")
     assert "the cheapest engine is ours in a01." in report.answer
     assert {row.flags for row in report.cases if row.case.scene.name == "calm"} == {"nothing moves"}
+    assert all(plot.png.startswith(PNG) for plot in report.pictures)
     odd = section(page_of(found), "What is odd")
     assert "too good" not in odd
 
@@ -349,6 +350,7 @@ def test_scene_in_which_nothing_moves_is_said_to_be_one_and_has_no_price():
 def test_flags_of_all_steps_are_said_once_and_timings_are_not_among_them():
     found = with_runs(results(scenes=("calm",), engines=("ours",)), {"error_max": 0.0}, lambda case: case.dt == 1e-3)
     found = with_runs(found, {"error_max": 2e-3}, lambda case: case.dt == 2e-2)
+    assert all(plot.png.startswith(PNG) for plot in Report(found).pictures)
     odd = section(page_of(with_timings(found, step_spread=0.4)), "What is odd")
     assert odd.count("ours rk4: order 4.3 where 4 is claimed") == 1  # log2(2e-3 / 1e-4) = 4.32
     assert odd.count("ours rk4, step 0.001 s: too good: no error at all") == 1

@@ -81,7 +81,8 @@ class Run:
     def pull(self, q: Any, v: Any, t: float) -> Any:
         its = self.rules
         torque = its.coriolis(self, q, v) + its.weight(self, q, t) + its.forces(self, q, v, t)
-        return dgesv(its.mass(self, q), torque)[2]  # numpy's way to it takes five times as long for a few links
+        _, _, acceleration, singular = dgesv(its.mass(self, q), torque)  # numpy's way to it takes five times as long
+        return np.full_like(torque, np.nan) if singular else acceleration
 
     def advance(self, steps: int) -> None:
         self.calls += 1

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import re
 import sys
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Iterable, Iterator
+from functools import cache, lru_cache
 from importlib import metadata
+from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
-from operator import itemgetter
 from pathlib import Path
 
 from pendbench.engines.registry import engine
@@ -37,15 +36,21 @@ def installed() -> tuple[tuple[str, int], ...]:
     return tuple((path, os.stat(path).st_mtime_ns) for path in sys.path if os.path.isdir(path))
 
 
-@cache
+@lru_cache(maxsize=1)
 def _records(where: tuple[tuple[str, int], ...]) -> tuple[tuple[metadata.Distribution, str], ...]:
     """Every distribution that has a record of its files, with that record, for what is installed now.
 
     importlib.metadata's own table of packages takes five times as long.
     """
     del where
-    records = ((each, each.read_text("RECORD")) for each in metadata.distributions())
-    return tuple((each, record) for each, record in records if record)
+    return tuple((each, record) for each in metadata.distributions() if (record := _record(each)))
+
+
+def _record(distribution: metadata.Distribution) -> str | None:
+    try:
+        return distribution.read_text("RECORD")
+    except (OSError, UnicodeDecodeError):
+        return None
 
 
 @cache
@@ -65,10 +70,10 @@ def _parts(library: str) -> Iterator[bytes]:
         return
     if spec is None:
         return
-    holds = re.compile(rf"^{re.escape(library)}[/.]", re.MULTILINE)
-    found = [(each.name, each, record) for each, record in _records(installed()) if holds.search(record)]
-    if found and not any(_is_editable(each) for _, each, _ in found):
-        yield from (record.encode() for _, _, record in sorted(found, key=itemgetter(0)))
+    holds = re.compile(rf"^{re.escape(library)}(?:/|\.py,|\.[^/,]*(?:so|pyd),)", re.MULTILINE)
+    found = [(each.name or "", record, each) for each, record in _records(installed()) if holds.search(record)]
+    if _is_explained(spec, library, [each for _, _, each in found]):
+        yield from (record.encode() for _, record in sorted((name, record) for name, record, _ in found))
         return
     folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
     files = {file for folder in folders for file in folder.rglob("*") if file.suffix != ".pyc" and file.is_file()}
@@ -77,7 +82,12 @@ def _parts(library: str) -> Iterator[bytes]:
         yield file.read_bytes()
 
 
-def _is_editable(distribution: metadata.Distribution) -> bool:
-    """Whether it is installed from a folder where it is worked on: then its record does not tell what is run."""
-    source = json.loads(distribution.read_text("direct_url.json") or "{}")
-    return bool(source.get("dir_info", {}).get("editable"))
+def _is_explained(spec: ModuleSpec, library: str, found: Iterable[metadata.Distribution]) -> bool:
+    """Whether all that an import would find is where these distributions have put theirs.
+
+    It is not where a package is worked on in its folder, or another copy comes first on the path.
+    """
+    whole = spec.submodule_search_locations
+    run = [Path(spec.origin or "").parent] if whole is None else whole
+    put = [each.locate_file("" if whole is None else library) for each in found]
+    return {os.path.realpath(place) for place in run} <= {os.path.realpath(str(place)) for place in put}

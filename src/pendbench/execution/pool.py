@@ -117,6 +117,8 @@ class LocalPool:
         try:
             assert self._pool.active  # asking starts it
         except BrokenProcessPool as error:
+            self._pool.stop()  # those that could be
+            self._pool.join()
             raise InputError(f"worker processes cannot be started: {describe(error.__cause__ or error)}") from None
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:

@@ -17,7 +17,7 @@ from pendbench.base.faults import STATUSES
 from pendbench.base.files import write_whole
 from pendbench.base.strict import input_error, shown_path
 from pendbench.measures.verdict import rank
-from pendbench.study.case_table import KEYS, case_key, case_text, is_missing, read_cases
+from pendbench.study.case_table import KEYS, case_key, case_text, is_nan, read_cases
 from pendbench.study.changes import REPRODUCED, Measure, Range, told_by
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _moved(before: pd.Series, now: pd.Series) -> Iterator[tuple[Measure, str]]:
     """Each number that is where it may not be, and what to say of it."""
     for measure in REPRODUCED:
         column = measure.name
-        if column not in before or column not in now or is_missing(before[column]):
+        if column not in before or column not in now or is_nan(before[column]):
             continue
         was, value = float(before[column]), float(now[column])
         if measure.moved(was, value):

@@ -47,15 +47,15 @@ def read_cases(path: Path, numbers: Iterable[str]) -> pd.DataFrame:
     return table
 
 
-def is_missing(cell: Any) -> bool:
-    """Whether a cell is empty."""
+def is_nan(cell: Any) -> bool:
+    """Whether a cell has no number: so an empty one is read."""
     return isinstance(cell, float) and math.isnan(cell)
 
 
 def case_key(row: pd.Series) -> tuple[str, ...]:
     """What tells the cases of a table apart, as text."""
-    dt = "" if is_missing(row["dt"]) else f"{float(row['dt']):g}"
-    settings = "" if is_missing(row["settings"]) else str(row["settings"])
+    dt = "" if is_nan(row["dt"]) else f"{float(row['dt']):g}"
+    settings = "" if is_nan(row["settings"]) else str(row["settings"])
     return str(row["scene"]), str(row["engine"]), str(row["method"]), dt, settings
 
 
