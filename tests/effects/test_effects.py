@@ -383,7 +383,10 @@ def test_every_effect_shows(which: str) -> None:
 # Refusals
 
 
-@pytest.mark.parametrize("method", ["taylor", "rattle", "frame", "bdf2"])
+PLAIN = ["taylor", "rattle", "adaptive_rattle", "frame", "bdf2", "energy_momentum", "implicit_euler"]
+
+
+@pytest.mark.parametrize("method", PLAIN)
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_methods_for_plain_chains_refuse_effects(method: str, effect: str) -> None:
     dt = None if method == "taylor" else 0.01
