@@ -20,8 +20,7 @@ def hanging_masses(masses: FloatArray) -> FloatArray:
 
 def mass_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
     """C(theta), (n, n) kg m^2, symmetric and positive definite. theta: (n,) rad. equations.md (E7), (E53), (E55)."""
-    lumped = _pair_inertias(scene) * np.cos(np.subtract.outer(theta, theta))
-    return np.asarray(lumped + np.diag(acting.link_inertias(scene)) + _rotor_matrix(scene))
+    return np.asarray(_pair_inertias(scene) * np.cos(np.subtract.outer(theta, theta)) + _own_inertias(scene))
 
 
 def coupling_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
@@ -52,13 +51,16 @@ def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float =
     return np.asarray(cho_solve(cho_factor(mass_matrix(scene, theta)), torques))
 
 
+@acting.once_a_scene
 def _pair_inertias(scene: Scene) -> FloatArray:
     """M_max(i,j) l_i l_j, (n, n)."""
     hanging, links = hanging_masses(acting.lumped_masses(scene)), np.arange(scene.n)
     return np.asarray(hanging[np.maximum.outer(links, links)] * np.outer(scene.lengths, scene.lengths))
 
 
-def _rotor_matrix(scene: Scene) -> FloatArray:
-    """What the rotors in the joints add to C, (n, n) kg m^2. equations.md (E55)."""
+@acting.once_a_scene
+def _own_inertias(scene: Scene) -> FloatArray:
+    """What the links themselves and the rotors in the joints add to C, (n, n) kg m^2. equations.md (E53), (E55)."""
     bends = np.eye(scene.n) - np.eye(scene.n, k=-1)
-    return np.asarray(bends.T @ (acting.rotor_inertias(scene)[:, np.newaxis] * bends))
+    rotors = bends.T @ (acting.rotor_inertias(scene)[:, np.newaxis] * bends)
+    return np.asarray(np.diag(acting.link_inertias(scene)) + rotors)
