@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 
@@ -18,6 +19,8 @@ settings.register_profile(
 settings.load_profile("any machine")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+gc.set_threshold(20_000)  # to look for garbage as often as by default takes a twentieth of the tests' time
 
 
 @pytest.fixture(scope="session", autouse=True)

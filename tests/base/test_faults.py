@@ -31,7 +31,7 @@ def study(tmp_path_factory) -> Path:
 
 
 def started(study: Path, out: Path, *options: str, before: Callable[[], None] | None = None) -> subprocess.Popen:
-    line = [sys.executable, "-m", "pendbench.study", str(study), "--out", str(out), *(options or ("--jobs", "2"))]
+    line = [sys.executable, "-m", "pendbench.study", str(study), "--out", str(out), *(options or ("--jobs", "1"))]
     return subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=before)  # noqa: PLW1509
 
 
@@ -83,7 +83,7 @@ def test_a_study_that_is_killed_again_and_again_gives_the_same_table(study, undi
 
 
 def test_a_study_that_is_killed_as_it_reports_has_whole_files(study, undisturbed, tmp_path):
-    killed_in_writing("report.md", 1, study, "--out", tmp_path, "--jobs", "2")
+    killed_in_writing("report.md", 1, study, "--out", tmp_path, "--jobs", "1")
     assert not (tmp_path / "report.md").exists()
     assert table(tmp_path) == undisturbed
     ended(started(study, tmp_path))

@@ -35,7 +35,7 @@ from pendbench.study.plan import load_plan
 from pendbench.study.results import Results
 from pendbench.study.timing import Timed
 from pendbench.study.truths import Compared, KeptTruth, measure_truth
-from support.job_functions import fail_to_price
+from support.no_prices import fail_to_price
 from support.reading import section, tables_of
 from support.scenes import chain
 
