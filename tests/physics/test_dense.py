@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import mpmath
 import numpy as np
 import pytest
@@ -173,3 +176,30 @@ def test_mass_matrix_ruined_by_rounding_is_an_error():
     scene = chain([1e-20, 1.0], [1.0, 1.0])
     with pytest.raises(LinAlgError):
         dense.accelerations(scene, np.array([0.5, 0.5]), np.zeros(2))
+
+
+FORMS = (dense.mass_matrix, dense.coupling_matrix, dense.weight_torques)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_is_kept_of_a_scene_is_its_own(form):
+    """Asked in turn, and with what came back written over, each scene gives what another of its kind gives afresh."""
+    theta = np.array([0.3, -1.1, 2.0])
+    one = chain([1.0, 2.0, 3.0], [1.0, 0.5, 0.7]).with_(rod_mass=0.2, armature=0.1)
+    other = one.with_(masses=[3.0, 2.0, 1.0], armature=0.4)
+    expected = [form(scene.with_(), theta) for scene in (one, other)]
+    assert not np.array_equal(*expected)
+    for _ in range(2):
+        for scene, right in zip((one, other), expected, strict=True):
+            found = form(scene, theta)
+            np.testing.assert_array_equal(found, right)
+            found *= 2.0
+
+
+def test_what_is_kept_of_a_scene_ends_with_it():
+    scene = chain([1.0, 2.0], [1.0, 0.5])
+    dense.accelerations(scene, np.ones(2), np.ones(2))
+    gone = weakref.ref(scene)
+    del scene
+    gc.collect()
+    assert gone() is None

@@ -5,10 +5,7 @@ Arrays are (..., n); what depends on the time takes it as t s, a number or an ar
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -18,20 +15,6 @@ from pendbench.base.errors import InputError
 from pendbench.physics.geometry import velocities
 from pendbench.scene.links import Links
 from pendbench.scene.scene import Scene
-
-
-def once_a_scene(of_scene: Callable[[Scene], FloatArray]) -> Callable[[Scene], FloatArray]:
-    """The same, worked out once for each scene, as nothing can change one. The array is read-only."""
-    known: WeakKeyDictionary[Scene, FloatArray] = WeakKeyDictionary()
-
-    @wraps(of_scene)
-    def once(scene: Scene) -> FloatArray:
-        if (found := known.get(scene)) is None:
-            found = known[scene] = of_scene(scene)
-            found.flags.writeable = False
-        return found
-
-    return once
 
 
 def _with(scene: Scene, law: str) -> list[Any]:
@@ -45,7 +28,7 @@ def links(scene: Scene) -> Links:
     """
     if scene.links is not None:
         return scene.links
-    masses = sum((term.rod_masses(term) for term in _with(scene, "rod_masses")), np.zeros(scene.n))
+    masses = np.sum([np.zeros(scene.n), *(term.rod_masses(term) for term in _with(scene, "rod_masses"))], axis=0)
     return Links(masses, 0.5 * scene.lengths, masses * scene.lengths**2 / 12.0)
 
 
@@ -54,7 +37,6 @@ def has_links(scene: Scene) -> bool:
     return scene.links is not None or bool(_with(scene, "rod_masses"))
 
 
-@once_a_scene
 def lumped_masses(scene: Scene) -> FloatArray:
     """The masses (n,) kg with a share of each link at each of its ends, as its centre is near. equations.md (E53)."""
     its = links(scene)
@@ -63,17 +45,16 @@ def lumped_masses(scene: Scene) -> FloatArray:
     return np.asarray(scene.masses + outer + np.append(inner[1:], 0.0))
 
 
-@once_a_scene
 def link_inertias(scene: Scene) -> FloatArray:
     """What links with their masses at their ends lack on C's diagonal, (n,) kg m^2; often negative. (E53)."""
     its = links(scene)
     return np.asarray(its.inertia - its.mass * its.centre * (scene.lengths - its.centre))
 
 
-@once_a_scene
 def rotor_inertias(scene: Scene) -> FloatArray:
     """The rotors' inertias in the joints, (n,) kg m^2. equations.md (E55)."""
-    return sum((term.rotor_inertias(term) for term in _with(scene, "rotor_inertias")), np.zeros(scene.n))
+    rotors = [term.rotor_inertias(term) for term in _with(scene, "rotor_inertias")]
+    return np.asarray(np.sum([np.zeros(scene.n), *rotors], axis=0))
 
 
 def bends(angles: FloatArray) -> FloatArray:

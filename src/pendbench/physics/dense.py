@@ -6,11 +6,30 @@ dense system loses digits where masses differ by many decades (equations.md, "Wh
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from pendbench.base.arrays import FloatArray
 from pendbench.physics import acting
 from pendbench.scene.scene import Scene
+
+
+def _once_a_scene(of_scene: Callable[[Scene], FloatArray]) -> Callable[[Scene], FloatArray]:
+    """The same, worked out once for each scene, as nothing should change one; the array is read-only."""
+    known: WeakKeyDictionary[Scene, FloatArray] = WeakKeyDictionary()
+
+    @wraps(of_scene)
+    def once(scene: Scene) -> FloatArray:
+        if (found := known.get(scene)) is None:
+            found = of_scene(scene)
+            found.flags.writeable = False
+            known[scene] = found
+        return found
+
+    return once
 
 
 def hanging_masses(masses: FloatArray) -> FloatArray:
@@ -34,8 +53,7 @@ def coupling_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
 def weight_torques(scene: Scene, theta: FloatArray, t: float = 0.0) -> FloatArray:
     """h(theta), (n,) N m: minus what gravity and a driven pivot do. theta: (n,) rad; t: s. equations.md (E9), (E37)."""
     x, y = acting.pivot_acceleration(scene, t)
-    torques = hanging_masses(acting.lumped_masses(scene)) * scene.lengths
-    return np.asarray(torques * (y * np.sin(theta) + x * np.cos(theta)))
+    return np.asarray(_levers(scene) * (y * np.sin(theta) + x * np.cos(theta)))
 
 
 def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float = 0.0) -> FloatArray:
@@ -51,16 +69,24 @@ def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float =
     return np.asarray(cho_solve(cho_factor(mass_matrix(scene, theta)), torques))
 
 
-@acting.once_a_scene
+@_once_a_scene
+def _levers(scene: Scene) -> FloatArray:
+    """M_k l_k, (n,) kg m."""
+    return hanging_masses(acting.lumped_masses(scene)) * scene.lengths
+
+
+@_once_a_scene
 def _pair_inertias(scene: Scene) -> FloatArray:
     """M_max(i,j) l_i l_j, (n, n)."""
     hanging, links = hanging_masses(acting.lumped_masses(scene)), np.arange(scene.n)
     return np.asarray(hanging[np.maximum.outer(links, links)] * np.outer(scene.lengths, scene.lengths))
 
 
-@acting.once_a_scene
+@_once_a_scene
 def _own_inertias(scene: Scene) -> FloatArray:
-    """What the links themselves and the rotors in the joints add to C, (n, n) kg m^2. equations.md (E53), (E55)."""
+    """What links and the rotors in their joints add to C, (n, n) kg m^2. equations.md (E53), (E55)."""
+    links, rotors = acting.link_inertias(scene), acting.rotor_inertias(scene)
+    if not links.any() and not rotors.any():
+        return np.broadcast_to(0.0, (scene.n, scene.n))
     bends = np.eye(scene.n) - np.eye(scene.n, k=-1)
-    rotors = bends.T @ (acting.rotor_inertias(scene)[:, np.newaxis] * bends)
-    return np.asarray(np.diag(acting.link_inertias(scene)) + rotors)
+    return np.asarray(np.diag(links) + bends.T @ (rotors[:, np.newaxis] * bends))

@@ -40,7 +40,7 @@ def split(exact: Fraction, parts: int = 2) -> tuple[float, ...]:
 
 
 def _series(x: int, first: int) -> int:
-    """Sin x (first = 1) or cos x (first = 0) to 70 digits, for |x| up to 2 pi: both in units of `_UNIT`."""
+    """Sin x (first = 1) or cos x (first = 0) to 1e-70, for |x| up to 2 pi: both in units of `_UNIT`."""
     total, term = 0, x if first else _UNIT
     for power in range(first, first + 96, 2):
         total += term
