@@ -180,7 +180,7 @@ def test_a_job_that_kills_its_workers_is_an_outcome_and_its_neighbours_are_not(p
     monkeypatch.setattr(module, "Batches", lambda jobs, most: Batches(jobs, most, 4))
     jobs = numbered(16)
     jobs.insert(5, job(does.kill_parent, key="kills"))
-    with dask.config.set({"distributed.comm.timeouts.connect": 5}):  # s; what a dead worker had done, Dask asks it for
+    with dask.config.set({"distributed.comm.timeouts.connect": 10}):  # s; what a dead worker had done, Dask asks it for
         found = outcomes(pool, jobs)
     assert found.pop("kills").fault == ("crashed", EVERY_WORKER_DIED)
     assert values(found) == {str(i): i for i in range(16)}

@@ -208,11 +208,11 @@ def test_address_space_is_not_memory(pool):
 @LINUX
 def test_what_jobs_leave_behind_is_no_burden_on_others_and_does_not_grow_for_ever():
     with LocalPool(1) as pool:
-        kept = [job(does.take_and_keep, 0.4, key=str(i), memory_limit=0.6) for i in range(3)]
+        kept = [job(does.take_and_keep, 0.4, key=str(i), memory_limit=0.6) for i in range(5)]
         pids = [outcome.value for outcome in pool.run(kept, alone=True)]
     assert None not in pids
     assert pids[0] == pids[1], "less than the limit is left behind: the worker goes on"
-    assert pids[2] != pids[0]
+    assert len(set(pids)) == 3
 
 
 def test_a_job_that_leaves_as_a_used_up_worker_does_is_not_tried_for_ever(pool):

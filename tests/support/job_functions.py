@@ -1,4 +1,4 @@
-"""What test_jobs.py has worker processes do. Each starts with this: what is slow to load waits until it is needed."""
+"""What test_jobs.py has worker processes do."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import numba
 import numpy as np
 
 from pendbench.base.errors import InputError
@@ -141,7 +142,6 @@ def spin(seconds: float = math.inf) -> str:
 
 def spin_compiled() -> None:
     """As a kernel does that comes to no end: the interpreter gets no turn."""
-    import numba
 
     @numba.njit
     def shift_until_zero(bits):  # which it never is
@@ -156,8 +156,6 @@ def spin_compiled() -> None:
 
 def compile_for(seconds: float) -> float:
     """Compile kernels, from nothing, until that has taken so much processor time. Returns how much it was."""
-    import numba
-
     begun = time.process_time()
     while (taken := time.process_time() - begun) < seconds:
         numba.njit(lambda x: [str(x), np.sort(np.array([x, x + 1.0])), {x: np.zeros(2)}][0])(2.0)
