@@ -15,6 +15,7 @@ from pendbench.scene.scene import Scene, load_scene
 from pendbench.solvers import adaptive_rattle as module
 from pendbench.solvers.adaptive_rattle import TURN, adaptive_rattle, begin, write_start
 from pendbench.solvers.closing import chain_of
+from pendbench.solvers.multipliers import SPEED_X, SPEED_Y, X, Y
 from support.scenes import chain, random_chain, rope
 
 DT = 1 / 480
@@ -72,8 +73,9 @@ class Walk:
     def turn_back(self) -> None:
         """Stand before the last step, having come from after it."""
         memory, steps = self.state.memory, self.state.steps
-        memory[:2, 1:-1] -= steps[module._LAST] * memory[5:7, :-2]
-        memory[5:7] *= -1.0
+        for rods, speeds in ((X, SPEED_X), (Y, SPEED_Y)):
+            memory[rods, 1:-1] -= steps[module._LAST] * memory[speeds, :-2]
+            memory[speeds] *= -1.0
         steps[module._BEFORE], steps[module._OLDER] = 0.0, 0.0
 
 
@@ -84,20 +86,20 @@ def test_the_way_back_takes_the_same_steps(scene: Scene) -> None:
     A step that followed the one before would be off by that change.
     """
     walk = Walk(scene, 0.02)
-    start = walk.state.memory[:2].copy()
+    start = walk.state.memory[[X, Y]]
     there = np.array(walk.steps(60))
     assert there.min() < 0.8 * there.max()
     walk.turn_back()
     back = np.array(walk.steps(59)[::-1])
     assert np.abs(np.log(back / there[:-1])).max() < np.abs(np.diff(np.log(there))).max() / 30
-    np.testing.assert_allclose(walk.state.memory[:2], start, atol=1e-4 * scene.lengths.max())
+    np.testing.assert_allclose(walk.state.memory[[X, Y]], start, atol=1e-4 * scene.lengths.max())
 
 
 def test_a_step_turns_the_fastest_rod_by_what_it_may() -> None:
     """Without gravity, and with a step asked for that is far too long, nothing but the turn limits it."""
     walk = Walk(chain(1, length=1.0, rate=3.0, gravity=None), 1.0)
     h = walk.steps(10)[-1]
-    chord = h * math.hypot(*walk.state.memory[5:7, 0])
+    chord = h * math.hypot(*walk.state.memory[[SPEED_X, SPEED_Y], 0])
     assert 1.0 / h**2 == pytest.approx(1.0 + (chord / (TURN * h)) ** 2, rel=1e-6)
 
 
@@ -171,7 +173,7 @@ def test_what_is_stuck_on_the_way_stops_at_the_last_output_before() -> None:
 def test_what_cannot_begin_stays_as_it_was() -> None:
     walk = Walk(random_chain(3, seed=3), 1e-3)
     assert adaptive_rattle(walk.chain, walk.state, 0, 1e-3, 10) == 10
-    walk.state.memory[5] *= 1e9
+    walk.state.memory[SPEED_X] *= 1e9
     kept = [part.copy() for part in walk.state[:5]]
     assert adaptive_rattle(walk.chain, walk.state, 10, 1e-3, 10) == 0
     for before, after in zip(kept, walk.state, strict=False):

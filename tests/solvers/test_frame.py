@@ -16,7 +16,7 @@ from pendbench.scene.scene import Scene
 from pendbench.solvers.closing import chain_of
 from pendbench.solvers.frame import LONGEST, MOST_SUBSTEPS, take_frames
 from pendbench.solvers.multipliers import Rows, pulls_within, rows_of
-from pendbench.solvers.rattle import FINEST, begin, rattle
+from pendbench.solvers.rattle import FINEST, LAST, PARTS, begin, rattle
 from support.kernels import called
 from support.scenes import chain, random_chain, rope
 
@@ -31,8 +31,8 @@ class Run:
         self.state = begin(scene.angles, scene.rates)
 
     def frames(self, frame: float, substeps: int, count: int) -> tuple[int, int]:
-        self.state.steps[1] = substeps
-        return take_frames(self.chain, self.state, 0, frame, count), int(self.state.steps[1])
+        self.state.steps[PARTS] = substeps
+        return take_frames(self.chain, self.state, 0, frame, count), int(self.state.steps[PARTS])
 
     def steps(self, h: float, count: int) -> int:
         return rattle(self.chain, self.state, 0, h, count)
@@ -181,7 +181,7 @@ def test_what_a_failed_frame_leaves_is_the_start_of_it() -> None:
     run = Run(random_chain(3, seed=3))
     assert run.frames(1e-3, 1, 10) == (10, 1)
     run.rows().speed_x[:] *= 1e9
-    kept, length = run.state.memory.copy(), run.state.steps[0]
+    kept, length = run.state.memory.copy(), run.state.steps[LAST]
     assert run.frames(1e-3, 1, 10) == (0, MOST_SUBSTEPS)
     np.testing.assert_array_equal(run.state.memory, kept)
-    assert run.state.steps[0] == length
+    assert run.state.steps[LAST] == length

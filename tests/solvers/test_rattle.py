@@ -12,7 +12,7 @@ from pendbench.physics.energy import energy, energy_scale
 from pendbench.physics.geometry import positions, rod_vectors, velocities
 from pendbench.scene.scene import Scene
 from pendbench.solvers.closing import chain_of
-from pendbench.solvers.rattle import State, begin, rattle
+from pendbench.solvers.rattle import PARTS, PATIENCE, State, begin, rattle
 from support.scenes import chain, random_chain
 
 
@@ -67,7 +67,7 @@ def test_it_is_rattle(n: int) -> None:
     scene, h, count = random_chain(n, seed=n), 5e-4, 100
     run = Run(scene)
     assert run.steps(h, count) == count
-    assert run.state.steps[1] == 1.0
+    assert run.state.steps[PARTS] == 1.0
     points, speeds = dense_rattle(scene, h, count)
     rods = rod_vectors(points)
     assert np.sin(run.state.q) == pytest.approx(rods[:, 0] / scene.lengths, abs=1e-9)
@@ -101,7 +101,7 @@ def test_changes_of_the_step_become_rare() -> None:
     """Steps of 8 ms are too long for five links. With changes every few hundred steps they lose 41 % in this time."""
     run = Run(chain(5, length=0.2, angle=2.0))
     assert run.steps(8e-3, 20_000) == 20_000
-    assert run.state.steps[3] > 200.0
+    assert run.state.steps[PATIENCE] > 200.0
     assert -0.1 < run.strays < 0.01
 
 
@@ -119,7 +119,7 @@ def test_a_whip_s_crack_is_taken_in_parts_and_nothing_else() -> None:
     run, parts = Run(chain(200, mass=1 / 200)), []
     for _ in range(800):
         assert run.steps(1.25e-4, 20) == 20
-        parts.append(run.state.steps[1])
+        parts.append(run.state.steps[PARTS])
     assert max(parts[:500]) == 1.0
     assert max(parts) > 1.0
     assert parts.count(1.0) > 700
@@ -131,7 +131,7 @@ def test_a_cut_step_is_its_parts() -> None:
     scene = chain(1, length=1.0, rate=6.0, gravity=None)
     cut, parts = Run(scene), Run(scene)
     assert cut.steps(0.1, 80) == 80
-    assert cut.state.steps[1] == 2.0
+    assert cut.state.steps[PARTS] == 2.0
     assert parts.steps(0.05, 160) == 160
     np.testing.assert_array_equal(cut.state.q, parts.state.q)
     assert cut.state.q[0] > 10 * np.pi

@@ -181,6 +181,7 @@ def _in_parts(chain: Chain, memory: FloatArray, steps: FloatArray, room: FloatAr
 def _write_state(chain: Chain, state: State) -> None:
     """The angles, the rates that the rods' lengths allow, and the gap."""
     s, n, lengths, rows = state.room, len(state.q), chain.lengths, rows_of(state.memory, state.room, len(state.q))
+    # What steps had in the room is of no use any more: `closing` has it now, by rows of its own.
     state.gap[0] = 0.0
     for i in range(n):
         x, y = rows.x[i + 1], rows.y[i + 1]
