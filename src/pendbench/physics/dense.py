@@ -6,8 +6,7 @@ dense system loses digits where masses differ by many decades (equations.md, "Wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -17,19 +16,17 @@ from pendbench.physics import acting
 from pendbench.scene.scene import Scene
 
 
-def _once_a_scene(of_scene: Callable[[Scene], FloatArray]) -> Callable[[Scene], FloatArray]:
-    """The same, worked out once for each scene, as nothing should change one; the array is read-only."""
-    known: WeakKeyDictionary[Scene, FloatArray] = WeakKeyDictionary()
+class _Fixed(NamedTuple):
+    """What depends on the scene alone: M_k l_k, (n,) kg m; M_max(i,j) l_i l_j, and what links and the rotors in their
+    joints add to C, (n, n) kg m^2. equations.md (E7), (E53), (E55).
+    """
 
-    @wraps(of_scene)
-    def once(scene: Scene) -> FloatArray:
-        if (found := known.get(scene)) is None:
-            found = of_scene(scene)
-            found.flags.writeable = False
-            known[scene] = found
-        return found
+    levers: FloatArray
+    pairs: FloatArray
+    own: FloatArray
 
-    return once
+
+_known: WeakKeyDictionary[Scene, _Fixed] = WeakKeyDictionary()
 
 
 def hanging_masses(masses: FloatArray) -> FloatArray:
@@ -39,7 +36,8 @@ def hanging_masses(masses: FloatArray) -> FloatArray:
 
 def mass_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
     """C(theta), (n, n) kg m^2, symmetric and positive definite. theta: (n,) rad. equations.md (E7), (E53), (E55)."""
-    return np.asarray(_pair_inertias(scene) * np.cos(np.subtract.outer(theta, theta)) + _own_inertias(scene))
+    fixed = _fixed(scene)
+    return np.asarray(fixed.pairs * np.cos(np.subtract.outer(theta, theta)) + fixed.own)
 
 
 def coupling_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
@@ -47,13 +45,13 @@ def coupling_matrix(scene: Scene, theta: FloatArray) -> FloatArray:
 
     theta: (n,) rad. equations.md (E8); the note's (19) with its sign mended.
     """
-    return _pair_inertias(scene) * -np.sin(np.subtract.outer(theta, theta))
+    return _fixed(scene).pairs * -np.sin(np.subtract.outer(theta, theta))
 
 
 def weight_torques(scene: Scene, theta: FloatArray, t: float = 0.0) -> FloatArray:
     """h(theta), (n,) N m: minus what gravity and a driven pivot do. theta: (n,) rad; t: s. equations.md (E9), (E37)."""
     x, y = acting.pivot_acceleration(scene, t)
-    return np.asarray(_levers(scene) * (y * np.sin(theta) + x * np.cos(theta)))
+    return np.asarray(_fixed(scene).levers * (y * np.sin(theta) + x * np.cos(theta)))
 
 
 def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float = 0.0) -> FloatArray:
@@ -69,22 +67,20 @@ def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float =
     return np.asarray(cho_solve(cho_factor(mass_matrix(scene, theta)), torques))
 
 
-@_once_a_scene
-def _levers(scene: Scene) -> FloatArray:
-    """M_k l_k, (n,) kg m."""
-    return hanging_masses(acting.lumped_masses(scene)) * scene.lengths
+def _fixed(scene: Scene) -> _Fixed:
+    """Worked out once for each scene, as nothing should change one."""
+    if (found := _known.get(scene)) is None:
+        found = _known[scene] = _work_out(scene)
+    return found
 
 
-@_once_a_scene
-def _pair_inertias(scene: Scene) -> FloatArray:
-    """M_max(i,j) l_i l_j, (n, n)."""
-    hanging, links = hanging_masses(acting.lumped_masses(scene)), np.arange(scene.n)
-    return np.asarray(hanging[np.maximum.outer(links, links)] * np.outer(scene.lengths, scene.lengths))
+def _work_out(scene: Scene) -> _Fixed:
+    hanging, index = hanging_masses(acting.lumped_masses(scene)), np.arange(scene.n)
+    pairs = hanging[np.maximum.outer(index, index)] * np.outer(scene.lengths, scene.lengths)
+    return _Fixed(hanging * scene.lengths, pairs, _own_inertias(scene))
 
 
-@_once_a_scene
 def _own_inertias(scene: Scene) -> FloatArray:
-    """What links and the rotors in their joints add to C, (n, n) kg m^2. equations.md (E53), (E55)."""
     links, rotors = acting.link_inertias(scene), acting.rotor_inertias(scene)
     if not links.any() and not rotors.any():
         return np.broadcast_to(0.0, (scene.n, scene.n))
