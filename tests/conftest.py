@@ -19,6 +19,8 @@ settings.register_profile(
 settings.load_profile("any machine")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+# A cluster's workers are killed again and again: those of a server that has loaded Dask are there the sooner.
+os.environ.setdefault("DASK_DISTRIBUTED__WORKER__MULTIPROCESSING_METHOD", "forkserver")
 
 gc.set_threshold(20_000)  # to look for garbage as often as by default takes a twentieth of the tests' time
 

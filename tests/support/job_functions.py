@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import multiprocessing
 import os
 import signal
 import sys
@@ -23,7 +24,14 @@ def identity(value: object) -> object:
 
 
 def process() -> tuple[int, int]:
-    return os.getpid(), os.getppid()
+    return os.getpid(), parent()
+
+
+def surroundings(variable: str) -> tuple[str | None, str, str]:
+    """What a variable is here, the folder, and where kernels are kept."""
+    from pendbench.base import compiled
+
+    return os.environ.get(variable), os.getcwd(), str(compiled._home())
 
 
 def threads_of_arithmetic() -> tuple[str | None, float]:
@@ -222,12 +230,15 @@ def meet(folder: str, name: str, others: int) -> int:
 
 
 def parent() -> int:
-    return os.getppid()
+    """The process that has the pool. What this one is a fork of is another, where there is a server of forks."""
+    process = multiprocessing.parent_process()
+    assert process is not None
+    return int(process.pid or 0)
 
 
 def kill_parent() -> None:
     """What no pool can guard against: the process that has it goes, too."""
-    os.kill(os.getppid(), signal.SIGKILL)
+    os.kill(parent(), signal.SIGKILL)
     time.sleep(600.0)
 
 
