@@ -28,13 +28,14 @@ from typing import Any, TypeVar, cast
 
 import llvmlite.binding as llvm
 import numba
+import numpy
 from numba.core import config as numba_config
-from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.extending import overload
 
+from pendbench.base import machine_code
 from pendbench.base.files import user_cache
 
 config: Any = numba_config  # its attributes are set while it is imported
@@ -163,7 +164,9 @@ def sources_of(source: Path) -> set[Path]:
 
 @cache
 def _digest(source: Path) -> bytes:
-    digest, its = hashlib.sha256(f"numba {numba.__version__}".encode()), sources_of(source)
+    digest, its = hashlib.sha256(f"numba {numba.__version__}, numpy {numpy.__version__}".encode()), sources_of(source)
+    if source not in its:
+        digest.update(_digest_outside(source))
     for path in _inside().values():
         if path in its:
             digest.update(_digest_alone(path))
@@ -174,6 +177,11 @@ def _digest(source: Path) -> bytes:
 def _digest_alone(source: Path) -> bytes:
     # What was typed at a prompt has no file to compare: nothing that was compiled before is used for it.
     return hashlib.sha256(source.read_bytes() if source.is_file() else os.urandom(16)).digest()
+
+
+def _digest_outside(source: Path) -> bytes:
+    """With its place: what else such a source has constants from is not known, but likely to be beside it."""
+    return str(source).encode() + _digest_alone(source)
 
 
 @cache
@@ -194,7 +202,7 @@ class _OnDisk:
 
     def __init__(self, kernel: Any) -> None:
         self._function, self._source = kernel.py_func, _source(kernel)
-        self._caches: dict[str, Any] = {}
+        self._folders: set[Path] = set()
         _digest(self._source)  # of the sources as they are now: that is what runs, whoever edits them later
 
     @property
@@ -204,28 +212,23 @@ class _OnDisk:
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """What was compiled for these types, or None."""
-        return self._cache(signature).load_overload(signature, context)
+        return machine_code.load(self._folder(signature), self._function, signature, context)
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Keep what was compiled for these types."""
-        self._cache(signature).save_overload(signature, compiled)
+        machine_code.save(self._folder(signature), self._function, signature, compiled)
 
     def flush(self) -> None:
-        """Forget what was kept."""
-        for each in self._caches.values():
-            each.flush()
+        """Forget what was kept, of the types that were asked for."""
+        for folder in self._folders:
+            machine_code.forget(folder, self._function)
 
-    def _cache(self, signature: Any) -> Any:
+    def _folder(self, signature: Any) -> Path:
         foreign = frozenset(_from_outside(signature))
         ours = not foreign and self._source in _inside().values()
-        name = cache_name(self._source, None if ours else foreign)
-        if name not in self._caches:
-            before, config.CACHE_DIR = config.CACHE_DIR, str(_home() / name)
-            try:
-                self._caches[name] = FunctionCache(self._function)  # type: ignore[no-untyped-call]
-            finally:
-                config.CACHE_DIR = before
-        return self._caches[name]
+        folder = _home() / cache_name(self._source, None if ours else foreign)
+        self._folders.add(folder)
+        return folder
 
 
 def _from_outside(kinds: Iterable[Any]) -> Iterator[str]:
@@ -344,4 +347,4 @@ def chosen_by_type(generic: Callable[..., Any]) -> Callable[[Kernel], Kernel]:
 
 def _know_source(source: Path, outside: dict[Path, bytes]) -> None:
     if source not in _inside().values() and _PACKAGE not in source.parents:
-        outside.setdefault(source, _digest_alone(source))
+        outside.setdefault(source, _digest_outside(source))

@@ -19,8 +19,10 @@ def user_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "pendbench"
 
 
-def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+def write_whole(path: Path, write: Callable[[IO[bytes]], object], *, lasting: bool = True) -> None:
     """Write a file so that it is there whole or not at all, whenever the program stops.
+
+    lasting: and whenever the machine does, which takes time; without it for what can be told from a broken one.
 
     A device or a pipe, as /dev/stdout, is written to, and not replaced by a file; nor is a link, but what it leads to.
     """
@@ -33,8 +35,9 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             write(file)
-            file.flush()
-            os.fsync(file.fileno())
+            if lasting:
+                file.flush()
+                os.fsync(file.fileno())
         os.chmod(name, 0o644)
         os.replace(name, path)
     except BaseException:

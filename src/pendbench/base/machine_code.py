@@ -1,0 +1,71 @@
+"""Machine code of kernels on disk: a file for each kernel and each set of types of its arguments.
+
+numba's own cache has an index for each kernel, which two processes that save at once write over each other's, and a
+place for each path that the source has. Here the name of a file says what it is for, and what it says is compared; so
+no process is in another's way, and copies of the project use the same files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import re
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from numba.core import compiler, serialize
+
+from pendbench.base.files import write_whole
+
+_RESULT: Final[Any] = compiler.CompileResult
+_NUMBA: Final[Any] = serialize
+_ADDRESS: Final = re.compile(r"\b0x[0-9a-f]+")
+_NO_NAME: Final = re.compile(r"[^\w.]")  # as <locals>, which no file may be called on some systems
+
+Function = Callable[..., Any]
+
+
+def load(folder: Path, function: Function, signature: Any, context: Any) -> Any:
+    """What `save` kept of this function for arguments of these numba types; None for nothing that can be read."""
+    context.refresh()  # it may not know all types yet
+    key = _key(function, signature, context.codegen())
+    try:
+        kept, parts = pickle.loads(_path(folder, function, key).read_bytes())
+    except Exception:  # no such file; or one that something happened to: it is written again
+        return None
+    return _RESULT._rebuild(context, *parts) if kept == key else None
+
+
+def save(folder: Path, function: Function, signature: Any, compiled: Any) -> None:
+    """Keep what numba compiled, where that can be done: what is not kept is compiled again."""
+    if compiled.library.has_dynamic_globals:  # addresses of this process
+        return
+    key = _key(function, signature, compiled.library.codegen)
+    content = _NUMBA.dumps((key, compiled._reduce()))
+    with suppress(OSError):
+        write_whole(_path(folder, function, key), lambda file: file.write(content), lasting=False)
+
+
+def forget(folder: Path, function: Function) -> None:
+    """Remove all that is kept of a function."""
+    for path in folder.glob(f"{_stem(function)}-*"):
+        path.unlink(missing_ok=True)
+
+
+def _key(function: Function, signature: Any, codegen: Any) -> tuple[Any, ...]:
+    """What must be equal for the machine code to be right, beside the source: types, machine, Python, and constants."""
+    closure = tuple(cell.cell_contents for cell in function.__closure__ or ())
+    digest = hashlib.sha256(function.__code__.co_code + _NUMBA.dumps(closure)).hexdigest()
+    return signature, codegen.magic_tuple(), (*sys.version_info[:2], sys.abiflags), digest
+
+
+def _path(folder: Path, function: Function, key: tuple[Any, ...]) -> Path:
+    words = _ADDRESS.sub("", repr(key))
+    return folder / f"{_stem(function)}-{hashlib.sha256(words.encode()).hexdigest()[:16]}.kernel"
+
+
+def _stem(function: Function) -> str:
+    return f"{_NO_NAME.sub('', function.__qualname__)[-60:]}-{function.__code__.co_firstlineno}"

@@ -1,0 +1,143 @@
+"""Machine code on disk: found again by every copy of the source, never another's, and never a reason to fail."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pendbench
+from pendbench.base import compiled, machine_code
+
+# Of a method of ours, a step: which project it is, and whether the kernel was there.
+USE = """
+import numpy as np
+import pendbench
+from pendbench.physics.kernels.table import system_of
+from pendbench.scene.scene import Effects, Scene
+from pendbench.solvers.methods import fixed_step_methods
+
+chain = system_of(Scene("one", "", 1.0, [1.0], [1.0], [0.5], [1.0], Effects(gravity=1.0)))
+euler = fixed_step_methods()["euler"]
+euler.advance(chain, euler.begin(np.array([0.5]), np.array([1.0])), 0, 0.5, 1)
+print(pendbench.__file__, sum(euler.advance.stats.cache_hits.values()))
+"""
+
+
+ABSOLUTE = ctypes.CDLL(None).labs
+ABSOLUTE.argtypes, ABSOLUTE.restype = [ctypes.c_long], ctypes.c_long
+
+
+def kernel(times: float = 2.0):
+    """A kernel made anew, as in another process; times: a constant in it."""
+
+    @compiled.compiled
+    def scaled(x):
+        return times * x
+
+    return scaled
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiled.config, "CACHE_DIR", str(tmp_path))
+    compiled._home.cache_clear()
+    yield tmp_path / "pendbench"
+    compiled._home.cache_clear()
+
+
+def hits(its) -> int:
+    return sum(its.stats.cache_hits.values())
+
+
+def kept(folder) -> list[Path]:
+    return sorted(folder.glob("*/*.kernel"))
+
+
+def test_a_file_for_each_set_of_types_found_whoever_wrote_the_other(folder):
+    assert kernel()(1.5) == 3.0
+    assert kernel()(2) == 4.0
+    assert len(kept(folder)) == 2
+    again = kernel()
+    assert (again(1.5), again(2), hits(again)) == (3.0, 4.0, 2)
+
+
+def test_constants_that_a_kernel_has_from_around_it_are_part_of_what_it_is(folder):
+    assert kernel(2.0)(1.5) == 3.0
+    another = kernel(3.0)
+    assert (another(1.5), hits(another)) == (4.5, 0)
+    assert len(kept(folder)) == 2
+
+
+@pytest.mark.parametrize("content", [b"", b"no pickle", b"\x80\x05."], ids=["empty", "text", "cut"])
+def test_a_file_that_cannot_be_read_is_written_again(folder, content):
+    kernel()(1.5)
+    (path,) = kept(folder)
+    path.write_bytes(content)
+    for found in (0, 1):
+        again = kernel()
+        assert (again(1.5), hits(again)) == (3.0, found)
+
+
+def test_a_file_of_another_kernel_by_that_name_is_not_used(folder):
+    kernel(3.0)(1.5)
+    (theirs,) = kept(folder)
+    kernel(2.0)(1.5)
+    (ours,) = set(kept(folder)) - {theirs}
+    shutil.copy(theirs, ours)
+    again = kernel(2.0)
+    assert (again(1.5), hits(again)) == (3.0, 0)
+
+
+def test_what_cannot_be_kept_is_compiled_and_works(folder, monkeypatch):
+    def full(*_arguments, **_options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(machine_code, "write_whole", full)
+    assert kernel()(1.5) == 3.0
+    assert kept(folder) == []
+
+
+def test_forgetting_a_kernel_forgets_no_other(folder):
+    def other(x):
+        return x
+
+    first = kernel()
+    first(1.5)
+    first(2)
+    compiled.compiled(other)(1.5)
+    first._cache.flush()
+    assert [path.name.partition("-")[0] for path in kept(folder)] == [
+        "test_forgetting_a_kernel_forgets_no_other.locals.other"
+    ]
+
+
+def test_addresses_of_this_process_are_not_kept(folder):
+    """Of a function in C, for one: in another process that is elsewhere."""
+
+    @compiled.compiled
+    def called(x):
+        return ABSOLUTE(x)
+
+    assert called(-2) == 2
+    assert kept(folder) == []
+
+
+def test_a_copy_of_the_project_uses_what_this_one_compiled(tmp_path):
+    """The path of a source is nowhere in the name, nor the time of it."""
+    source = Path(pendbench.__file__).parent
+    shutil.copytree(source, tmp_path / "copy/pendbench", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "copy/pendbench/__init__.py").touch()
+    found = {}
+    for folder in (source.parent, tmp_path / "copy"):
+        variables = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        ran = subprocess.run([sys.executable, "-c", USE], env=variables, capture_output=True, text=True, check=False)
+        assert ran.returncode == 0, ran.stderr
+        file, hits = ran.stdout.split()
+        found[str(Path(file).parent.parent)] = int(hits)
+    assert found == {str(source.parent): 0, str(tmp_path / "copy"): 1}
