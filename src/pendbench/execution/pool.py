@@ -93,7 +93,9 @@ class LocalPool:
         with ExitStack() as undone:
             undone.enter_context(one_thread_each())
             begin = [dict(os.environ)]
-            self._pool = ProcessPool(self.workers, context=self._starting, initializer=_begin, initargs=begin)
+            self._pool = ProcessPool(
+                max_workers=self.workers, context=self._starting, initializer=_begin, initargs=begin
+            )
             with deaf_to_interrupts():
                 self._start()
             self._threads = undone.pop_all()
