@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pendbench.base.arrays import FloatArray
 from pendbench.base.errors import InputError
-from pendbench.physics.geometry import velocities
+from pendbench.physics.geometry import side_by_side, velocities
 from pendbench.scene.links import Links
 from pendbench.scene.scene import Scene
 
@@ -80,13 +80,8 @@ def pivot_velocity(scene: Scene, t: npt.ArrayLike) -> FloatArray:
 
 
 def _pivot(terms: list[Any], t: npt.ArrayLike, law: str = "pivot_acceleration") -> FloatArray:
-    t = np.asarray(t, np.float64)
-    total = np.zeros((*t.shape, 2))
-    for term in terms:
-        x, y = getattr(term, law)(term, t)
-        total[..., 0] += x
-        total[..., 1] += y
-    return total
+    parts = [getattr(term, law)(term, t) for term in terms]
+    return side_by_side(np.shape(t), sum(x for x, _ in parts), sum(y for _, y in parts))
 
 
 def joint_torques(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega: FloatArray) -> FloatArray:
@@ -95,8 +90,10 @@ def joint_torques(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega: Floa
 
 
 def _torques(terms: list[Any], t: npt.ArrayLike, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    bend, rate, t = bends(theta), bends(omega), np.asarray(t, np.float64)
     total = np.zeros(np.shape(theta))
+    if not terms:
+        return total
+    bend, rate, t = bends(theta), bends(omega), np.asarray(t, np.float64)
     for term in terms:
         drive = term.drive(term, t)[..., np.newaxis] if hasattr(term, "drive") else 0.0
         total += term.joint_torque(term, drive, ..., bend, rate)
@@ -131,10 +128,14 @@ def generalized_forces(scene: Scene, t: npt.ArrayLike, theta: FloatArray, omega:
 
 def mass_forces(scene: Scene, t: float, theta: FloatArray, omega: FloatArray) -> FloatArray:
     """The forces on the masses, (n, 2) N, that do what joints and air do to the chain. equations.md (E39), (E43)."""
-    joints = joint_torques(scene, t, theta, omega)
-    couples = (joints - np.append(joints[1:], 0.0)) / scene.lengths
-    pairs = couples[:, np.newaxis] * np.stack([np.cos(theta), np.sin(theta)], axis=-1)
-    return np.asarray(drag_forces(scene, t, theta, omega) + pairs - np.append(pairs[1:], np.zeros((1, 2)), axis=0))
+    joints, total = joint_torques(scene, t, theta, omega), drag_forces(scene, t, theta, omega)
+    couples = joints.copy()
+    couples[:-1] -= joints[1:]
+    couples /= scene.lengths
+    pairs = side_by_side(np.shape(theta), couples * np.cos(theta), couples * np.sin(theta))
+    total += pairs
+    total[:-1] -= pairs[1:]
+    return total
 
 
 def joint_potential(scene: Scene, theta: FloatArray) -> FloatArray:

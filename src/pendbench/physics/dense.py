@@ -57,14 +57,17 @@ def weight_torques(scene: Scene, theta: FloatArray, t: float = 0.0) -> FloatArra
 def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float = 0.0) -> FloatArray:
     """Solve for theta'', (n,) rad/s^2: C theta'' = S omega^2 - h + Q. theta: (n,) rad, omega: (n,) rad/s, t: s.
 
-    Raises scipy.linalg.LinAlgError where rounding has left C without its positive definiteness (masses that differ
+    Raises numpy.linalg.LinAlgError where rounding has left C without its positive definiteness (masses that differ
     by many decades). equations.md (E6), (E40); the note's (14), which has no Q.
     """
-    from scipy.linalg import cho_factor, cho_solve  # a quarter of a second, and most processes never come here
+    from scipy.linalg.lapack import dposv  # a quarter of a second, and most processes never come here
 
     torques = coupling_matrix(scene, theta) @ omega**2 - weight_torques(scene, theta, t)
     torques += acting.generalized_forces(scene, t, theta, omega)
-    return np.asarray(cho_solve(cho_factor(mass_matrix(scene, theta)), torques))
+    _, solution, not_definite = dposv(mass_matrix(scene, theta), torques)
+    if not_definite:
+        raise np.linalg.LinAlgError(f"the leading {not_definite} rows of C are not positive definite")
+    return np.asarray(solution)
 
 
 def _fixed(scene: Scene) -> _Fixed:
