@@ -102,7 +102,7 @@ def test_a_disk_without_room_is_one_line_or_a_reason_and_nothing_bad_is_kept(stu
     assert last.startswith("error: [Errno 27] File too large")
     assert last.endswith("what was finished is kept")
     assert not (tmp_path / "report.md").exists()
-    ended(started(study, tmp_path))
+    ended(started(study, tmp_path, "--bare", "--jobs", "1"))
     assert table(tmp_path) == undisturbed
 
 
