@@ -18,7 +18,8 @@ from pendbench.base import compiled, machine_code
 USE = """
 import pendbench
 from pendbench.solvers.crossing import first_crossing
-print(pendbench.__file__, round(first_crossing(0.0, 1.0, 1.0, 1.0, 0.5), 9), sum(first_crossing.stats.cache_hits.values()))
+found = round(first_crossing(0.0, 1.0, 1.0, 1.0, 0.5), 9)
+print(pendbench.__file__, found, sum(first_crossing.stats.cache_hits.values()))
 """
 
 
@@ -87,6 +88,19 @@ def test_a_file_of_another_kernel_by_that_name_is_not_used(folder):
     assert (again(1.5), hits(again)) == (3.0, 0)
 
 
+@pytest.mark.parametrize("name", ["<stdin>", "plugin.py"])
+def test_a_kernel_that_is_defined_again_is_not_the_one_before(folder, monkeypatch, name):
+    """At a prompt, or in a file that is edited and loaded again: the same name and line, and other constants."""
+    monkeypatch.chdir(folder.parent)
+    for times in (2.0, 3.0):
+        text = f"from pendbench.base.compiled import compiled\n@compiled\ndef scaled(x): return {times} * x\n"
+        if name == "plugin.py":
+            Path(name).write_text(text)
+        found: dict = {}
+        exec(compile(text, name, "exec"), found)
+        assert found["scaled"](1.5) == times * 1.5
+
+
 def test_what_cannot_be_kept_is_compiled_and_works(folder, monkeypatch):
     def full(*_arguments, **_options):
         raise OSError(28, "No space left on device")
@@ -94,20 +108,6 @@ def test_what_cannot_be_kept_is_compiled_and_works(folder, monkeypatch):
     monkeypatch.setattr(machine_code, "write_whole", full)
     assert kernel()(1.5) == 3.0
     assert kept(folder) == []
-
-
-def test_forgetting_a_kernel_forgets_no_other(folder):
-    def other(x):
-        return x
-
-    first = kernel()
-    first(1.5)
-    first(2)
-    compiled.compiled(other)(1.5)
-    first._cache.flush()
-    assert [path.name.partition("-")[0] for path in kept(folder)] == [
-        "test_forgetting_a_kernel_forgets_no_other.locals.other"
-    ]
 
 
 def test_addresses_of_this_process_are_not_kept(folder):

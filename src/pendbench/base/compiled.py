@@ -105,12 +105,13 @@ _for_their_own: dict[Path, bytes] = {}
 _for_any: dict[Path, bytes] = {}
 
 
-def cache_name(source: Path, apart: frozenset[str] | None = None) -> str:
+def cache_name(source: Path, apart: frozenset[str] | None = None, own: bytes = b"") -> str:
     """The name of a folder with machine code of the kernels in that file: the common one.
 
-    apart: or the one of what is kept apart, for what comes from outside the package by these names.
+    apart: or the one of what is kept apart, for what comes from outside the package by these names. own: what a source
+    outside the package was when its kernel was made.
     """
-    digest = hashlib.sha256(_digest(source) + b"".join(sorted(_for_any.values())))
+    digest = hashlib.sha256(_digest(source) + own + b"".join(sorted(_for_any.values())))
     if apart is not None:
         digest.update(b"apart" + b"".join(sorted(_for_their_own.values())) + repr(sorted(apart)).encode())
     return f"{source.stem}-{digest.hexdigest()[:16]}"
@@ -165,8 +166,6 @@ def sources_of(source: Path) -> set[Path]:
 @cache
 def _digest(source: Path) -> bytes:
     digest, its = hashlib.sha256(f"numba {numba.__version__}, numpy {numpy.__version__}".encode()), sources_of(source)
-    if source not in its:
-        digest.update(_digest_outside(source))
     for path in _inside().values():
         if path in its:
             digest.update(_digest_alone(path))
@@ -175,13 +174,16 @@ def _digest(source: Path) -> bytes:
 
 @cache
 def _digest_alone(source: Path) -> bytes:
-    # What was typed at a prompt has no file to compare: nothing that was compiled before is used for it.
-    return hashlib.sha256(source.read_bytes() if source.is_file() else os.urandom(16)).digest()
+    return hashlib.sha256(source.read_bytes()).digest()
 
 
 def _digest_outside(source: Path) -> bytes:
-    """With its place: what else such a source has constants from is not known, but likely to be beside it."""
-    return str(source).encode() + _digest_alone(source)
+    """As it is now, and its place: what else it has constants from is not known, but likely to be beside it.
+
+    What was typed at a prompt has no file to compare: nothing that was compiled before is used for it.
+    """
+    content = source.read_bytes() if source.is_file() else os.urandom(16)
+    return str(source).encode() + hashlib.sha256(content).digest()
 
 
 @cache
@@ -202,13 +204,15 @@ class _OnDisk:
 
     def __init__(self, kernel: Any) -> None:
         self._function, self._source = kernel.py_func, _source(kernel)
-        self._folders: set[Path] = set()
-        _digest(self._source)  # of the sources as they are now: that is what runs, whoever edits them later
+        # Of the sources as they are now: that is what runs, whoever edits them later.
+        self._inside = self._source in _inside().values()
+        self._own = b"" if self._inside else _digest_outside(self._source)
+        _digest(self._source)
 
     @property
     def cache_path(self) -> str:
         """Where the common one is."""
-        return str(_home() / cache_name(self._source))
+        return str(_home() / cache_name(self._source, own=self._own))
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """What was compiled for these types, or None."""
@@ -219,16 +223,12 @@ class _OnDisk:
         machine_code.save(self._folder(signature), self._function, signature, compiled)
 
     def flush(self) -> None:
-        """Forget what was kept, of the types that were asked for."""
-        for folder in self._folders:
-            machine_code.forget(folder, self._function)
+        """What numba asks for where constants of a module have changed, which those of kernels may not."""
 
     def _folder(self, signature: Any) -> Path:
         foreign = frozenset(_from_outside(signature))
-        ours = not foreign and self._source in _inside().values()
-        folder = _home() / cache_name(self._source, None if ours else foreign)
-        self._folders.add(folder)
-        return folder
+        apart = None if self._inside and not foreign else foreign
+        return _home() / cache_name(self._source, apart, self._own)
 
 
 def _from_outside(kinds: Iterable[Any]) -> Iterator[str]:

@@ -49,12 +49,6 @@ def save(folder: Path, function: Function, signature: Any, compiled: Any) -> Non
         write_whole(_path(folder, function, key), lambda file: file.write(content), lasting=False)
 
 
-def forget(folder: Path, function: Function) -> None:
-    """Remove all that is kept of a function."""
-    for path in folder.glob(f"{_stem(function)}-*"):
-        path.unlink(missing_ok=True)
-
-
 def _key(function: Function, signature: Any, codegen: Any) -> tuple[Any, ...]:
     """What must be equal for the machine code to be right, beside the source: types, machine, Python, and constants."""
     closure = tuple(cell.cell_contents for cell in function.__closure__ or ())
@@ -64,8 +58,5 @@ def _key(function: Function, signature: Any, codegen: Any) -> tuple[Any, ...]:
 
 def _path(folder: Path, function: Function, key: tuple[Any, ...]) -> Path:
     words = _ADDRESS.sub("", repr(key))
-    return folder / f"{_stem(function)}-{hashlib.sha256(words.encode()).hexdigest()[:16]}.kernel"
-
-
-def _stem(function: Function) -> str:
-    return f"{_NO_NAME.sub('', function.__qualname__)[-60:]}-{function.__code__.co_firstlineno}"
+    name = f"{_NO_NAME.sub('', function.__qualname__)[-60:]}-{function.__code__.co_firstlineno}"
+    return folder / f"{name}-{hashlib.sha256(words.encode()).hexdigest()[:16]}.kernel"

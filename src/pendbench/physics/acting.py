@@ -80,6 +80,7 @@ def pivot_velocity(scene: Scene, t: npt.ArrayLike) -> FloatArray:
 
 
 def _pivot(terms: list[Any], t: npt.ArrayLike, law: str = "pivot_acceleration") -> FloatArray:
+    t = t if isinstance(t, float) else np.asarray(t, np.float64)  # of a float, numpy would take three times as long
     parts = [getattr(term, law)(term, t) for term in terms]
     return side_by_side(np.shape(t), sum(x for x, _ in parts), sum(y for _, y in parts))
 
