@@ -27,6 +27,9 @@ ABSOLUTE = ctypes.CDLL(None).labs
 ABSOLUTE.argtypes, ABSOLUTE.restype = [ctypes.c_long], ctypes.c_long
 
 
+FACTOR = 2.0
+
+
 def kernel(times: float = 2.0):
     """A kernel made anew, as in another process; times: a constant in it."""
 
@@ -68,11 +71,13 @@ def test_constants_that_a_kernel_has_from_around_it_are_part_of_what_it_is(folde
     assert len(kept(folder)) == 2
 
 
-@pytest.mark.parametrize("content", [b"", b"no pickle", b"\x80\x05."], ids=["empty", "text", "cut"])
-def test_a_file_that_cannot_be_read_is_written_again(folder, content):
+@pytest.mark.parametrize(
+    "damage", [lambda _: b"", lambda _: b"no pickle", lambda was: was[:-100]], ids=["empty", "text", "cut"]
+)
+def test_a_file_that_cannot_be_read_is_written_again(folder, damage):
     kernel()(1.5)
     (path,) = kept(folder)
-    path.write_bytes(content)
+    path.write_bytes(damage(path.read_bytes()))
     for found in (0, 1):
         again = kernel()
         assert (again(1.5), hits(again)) == (3.0, found)
@@ -99,6 +104,18 @@ def test_a_kernel_that_is_defined_again_is_not_the_one_before(folder, monkeypatc
         found: dict = {}
         exec(compile(text, name, "exec"), found)
         assert found["scaled"](1.5) == times * 1.5
+
+
+def test_a_kernel_that_is_told_to_compile_again_does_so_and_the_others_find_what_was_kept(folder, monkeypatch):
+    @compiled.compiled
+    def scaled(x):
+        return FACTOR * x
+
+    assert scaled(1.5) == 3.0
+    monkeypatch.setitem(globals(), "FACTOR", 3.0)
+    scaled.recompile()
+    assert scaled(1.5) == 4.5
+    assert len(kept(folder)) == 2
 
 
 def test_what_cannot_be_kept_is_compiled_and_works(folder, monkeypatch):

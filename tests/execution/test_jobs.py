@@ -9,8 +9,6 @@ import subprocess
 import sys
 import textwrap
 import time
-from collections.abc import Iterator
-from multiprocessing import forkserver
 from pathlib import Path
 
 import pebble.pool.process
@@ -37,16 +35,6 @@ def pool():
     """One pool for most tests: they also show that a job leaves it fit for those after it."""
     with LocalPool(WORKERS) as made:
         yield made
-
-
-@pytest.fixture
-def its_own_server(monkeypatch) -> Iterator[None]:
-    """Workers of pools that begin in this test have its streams: the server they are forks of starts in it, too."""
-    server = forkserver.ForkServer()
-    for name in ("set_forkserver_preload", "ensure_running", "connect_to_new_process"):
-        monkeypatch.setattr(forkserver, name, getattr(server, name))
-    yield
-    server._stop()
 
 
 def job(function, *arguments, key: str = "", limit: float = 60.0, **limits: float) -> Job:
@@ -80,7 +68,7 @@ def test_arithmetic_takes_one_thread_unless_the_user_wants_more(monkeypatch):
 
 
 def test_workers_have_the_variables_and_the_folder_of_their_pool(tmp_path, monkeypatch):
-    """And not those of an earlier one, by which time the server began that they are forks of."""
+    """And not those of an earlier one."""
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         monkeypatch.setenv("OF_A_TEST", name)
@@ -92,14 +80,6 @@ def test_workers_have_the_variables_and_the_folder_of_their_pool(tmp_path, monke
         monkeypatch.delenv("OF_A_TEST")
     with LocalPool(1) as pool:
         assert outcomes(pool, job(does.surroundings, "OF_A_TEST"))["surroundings"].value[0] is None
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere workers start from nothing")
-def test_workers_of_all_pools_are_forks_of_one_server(pool):
-    with LocalPool(1) as another:
-        servers = {outcomes(its, job(os.getppid))["getppid"].value for its in (pool, another)}
-    assert len(servers) == 1
-    assert os.getpid() not in servers
 
 
 def test_a_pool_that_cannot_start_leaves_nothing_in_the_environment(monkeypatch):
@@ -160,7 +140,6 @@ FAULTS = {
 }
 
 
-@pytest.mark.usefixtures("its_own_server")
 def test_whatever_becomes_of_a_job_is_an_outcome_and_the_others_go_on(capfd):
     bad = [job(function, key=name) for name, (function, _, _) in FAULTS.items()]
     slow = [job(function, 3600.0, wall_limit=2.0) for function in (does.sleep, does.sleep_deaf)]
@@ -266,7 +245,6 @@ def test_a_function_that_workers_cannot_find_is_an_outcome(pool, monkeypatch):
     assert found["good"].value == 1
 
 
-@pytest.mark.usefixtures("its_own_server")
 def test_a_job_can_print_as_much_as_it_likes(capfd):
     with LocalPool(WORKERS) as pool:
         found = outcomes(pool, job(does.print_much, key="a"), job(does.print_much, key="b"))
@@ -352,7 +330,6 @@ def test_a_job_is_packed_before_it_is_sent(pool):
     assert outcomes(pool, job(does.identity, 1))["identity"].value == 1
 
 
-@pytest.mark.usefixtures("its_own_server")
 def test_a_worker_that_is_still_starting_as_the_pool_ends_says_nothing(capfd, monkeypatch):
     stop = pebble.pool.process.stop_process
 

@@ -230,7 +230,7 @@ def meet(folder: str, name: str, others: int) -> int:
 
 
 def parent() -> int:
-    """The process that has the pool. What this one is a fork of is another, where there is a server of forks."""
+    """The process that has the pool: what this one is a fork of can be another."""
     process = multiprocessing.parent_process()
     assert process is not None
     return int(process.pid or 0)

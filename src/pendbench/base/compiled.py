@@ -204,10 +204,9 @@ class _OnDisk:
 
     def __init__(self, kernel: Any) -> None:
         self._function, self._source = kernel.py_func, _source(kernel)
-        # Of the sources as they are now: that is what runs, whoever edits them later.
+        _digest(self._source)  # of the sources as they are now: that is what runs, whoever edits them later
         self._inside = self._source in _inside().values()
         self._own = b"" if self._inside else _digest_outside(self._source)
-        _digest(self._source)
 
     @property
     def cache_path(self) -> str:
@@ -223,7 +222,8 @@ class _OnDisk:
         machine_code.save(self._folder(signature), self._function, signature, compiled)
 
     def flush(self) -> None:
-        """What numba asks for where constants of a module have changed, which those of kernels may not."""
+        """Keep what comes from now on where nothing was: what is around the kernel has changed."""
+        self._own = os.urandom(16)
 
     def _folder(self, signature: Any) -> Path:
         foreign = frozenset(_from_outside(signature))

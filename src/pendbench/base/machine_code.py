@@ -22,7 +22,7 @@ from pendbench.base.files import write_whole
 
 _RESULT: Final[Any] = compiler.CompileResult
 _NUMBA: Final[Any] = serialize
-_ADDRESS: Final = re.compile(r"\b0x[0-9a-f]+")
+_ADDRESS: Final = re.compile(r"\b0x[0-9a-fA-F]+")
 _NO_NAME: Final = re.compile(r"[^\w.]")  # as <locals>, which no file may be called on some systems
 
 Function = Callable[..., Any]

@@ -47,19 +47,13 @@ def machine_memory() -> int:
     return int(psutil.virtual_memory().total)
 
 
-_NO_GUARD: Final = 'error: a script that runs a study needs the line `if __name__ == "__main__":` before it'
-
-
 def refuse_without_guard() -> None:
     """Leave where a script starts processes on a line that each of them would run, too.
 
     A worker runs the user's script again to know its functions: the script must not start workers then.
     """
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
-        sys.stderr.write(f"{_NO_GUARD}\n")  # a fork of a server leaves without a word
-        raise SystemExit(1)
-    if _unguarded():
-        raise SystemExit(_NO_GUARD)
+    if getattr(multiprocessing.current_process(), "_inheriting", False) or _unguarded():
+        raise SystemExit('error: a script that runs a study needs the line `if __name__ == "__main__":` before it')
 
 
 def _unguarded() -> bool:

@@ -58,7 +58,8 @@ def accelerations(scene: Scene, theta: FloatArray, omega: FloatArray, t: float =
     """Solve for theta'', (n,) rad/s^2: C theta'' = S omega^2 - h + Q. theta: (n,) rad, omega: (n,) rad/s, t: s.
 
     Raises numpy.linalg.LinAlgError where rounding has left C without its positive definiteness (masses that differ
-    by many decades). equations.md (E6), (E40); the note's (14), which has no Q.
+    by many decades); what is not finite gives nan or that error. equations.md (E6), (E40); the note's (14), which has
+    no Q.
     """
     from scipy.linalg.lapack import dposv  # a quarter of a second, and most processes never come here
 

@@ -20,7 +20,8 @@ def positions(lengths: FloatArray, theta: FloatArray) -> FloatArray:
 def velocities(lengths: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
     """(x', y') of the masses, (..., n, 2) m/s. theta: (..., n) rad; omega: (..., n) rad/s. The rate of (E1)."""
     speeds = lengths * omega
-    return np.cumsum(side_by_side(np.shape(theta), speeds * np.cos(theta), speeds * np.sin(theta)), axis=-2)
+    x, y = speeds * np.cos(theta), speeds * np.sin(theta)
+    return np.cumsum(side_by_side(np.shape(x), x, y), axis=-2)
 
 
 def side_by_side(shape: tuple[int, ...], x: Any, y: Any) -> FloatArray:
