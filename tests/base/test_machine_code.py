@@ -10,16 +10,19 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba.core.registry import cpu_target
 
 import pendbench
 from pendbench.base import compiled, machine_code
 
-# A kernel of ours: which project it is of, what it finds, and whether its machine code was there.
+# A kernel of ours: which project it is of, what it finds, whether its machine code was there, and whether numba had to
+# load all that it can compile.
 USE = """
+import sys
 import pendbench
 from pendbench.solvers.crossing import first_crossing
 found = round(first_crossing(0.0, 1.0, 1.0, 1.0, 0.5), 9)
-print(pendbench.__file__, found, sum(first_crossing.stats.cache_hits.values()))
+print(pendbench.__file__, found, sum(first_crossing.stats.cache_hits.values()), "numba.np.arraymath" in sys.modules)
 """
 
 
@@ -138,8 +141,17 @@ def test_addresses_of_this_process_are_not_kept(folder):
     assert kept(folder) == []
 
 
+def test_what_machine_code_uses_and_numba_has_not_loaded_is_loaded_before_it_runs(monkeypatch):
+    kernel()(1.5)
+    loaded: list[str] = []
+    monkeypatch.setattr(type(cpu_target.target_context), "refresh", lambda _: loaded.append("all"))
+    monkeypatch.setattr(machine_code.llvm, "address_of_symbol", lambda name: name != "PyNumber_Float" or None)
+    again = kernel()
+    assert (again(1.5), hits(again), loaded) == (3.0, 1, ["all"])
+
+
 def test_a_copy_of_the_project_uses_what_this_one_compiled(tmp_path):
-    """The path of a source is nowhere in the name, nor the time of it."""
+    """The path of a source is nowhere in the name, nor the time of it. Nothing else is loaded."""
     source = Path(pendbench.__file__).parent
     shutil.copytree(source, tmp_path / "copy/pendbench", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "copy/pendbench/__init__.py").touch()
@@ -150,4 +162,5 @@ def test_a_copy_of_the_project_uses_what_this_one_compiled(tmp_path):
         assert ran.returncode == 0, ran.stderr
         file, *rest = ran.stdout.split()
         found[Path(file).parents[1]] = rest
-    assert found == {source.parent: ["0.5", "0"], tmp_path / "copy": ["0.5", "1"]}
+    assert found[source.parent] == ["0.5", "0", "True"]
+    assert found[tmp_path / "copy"] == ["0.5", "1", "False"]

@@ -16,7 +16,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
+import llvmlite.binding as llvm
 from numba.core import compiler, serialize
+from numba.core.runtime.nrt import rtsys
 
 from pendbench.base.files import write_whole
 
@@ -30,13 +32,17 @@ Function = Callable[..., Any]
 
 def load(folder: Path, function: Function, signature: Any, context: Any) -> Any:
     """What `save` kept of this function for arguments of these numba types; None for nothing that can be read."""
-    context.refresh()  # it may not know all types yet
     key = _key(function, signature, context.codegen())
     try:
-        kept, parts = pickle.loads(_path(folder, function, key).read_bytes())
+        kept, needed, parts = pickle.loads(_path(folder, function, key).read_bytes())
     except Exception:  # no such file; or one that something happened to: it is written again
         return None
-    return _RESULT._rebuild(context, *parts) if kept == key else None
+    if kept != key:
+        return None
+    rtsys.initialize(context)
+    if any(llvm.address_of_symbol(name) is None for name in needed):
+        context.refresh()  # all that numba can compile, which takes half a second: few kernels need it to run
+    return _RESULT._rebuild(context, *parts)
 
 
 def save(folder: Path, function: Function, signature: Any, compiled: Any) -> None:
@@ -44,9 +50,16 @@ def save(folder: Path, function: Function, signature: Any, compiled: Any) -> Non
     if compiled.library.has_dynamic_globals:  # addresses of this process
         return
     key = _key(function, signature, compiled.library.codegen)
-    content = _NUMBA.dumps((key, compiled._reduce()))
+    content = _NUMBA.dumps((key, _needed(compiled.library), compiled._reduce()))
     with suppress(OSError):
         write_whole(_path(folder, function, key), lambda file: file.write(content), lasting=False)
+
+
+def _needed(library: Any) -> list[str]:
+    """What the machine code uses and does not have, by name: it ends the process if it is not there."""
+    module = library._final_module
+    values = (*module.functions, *module.global_variables)
+    return [its.name for its in values if its.is_declaration and not its.name.startswith("llvm.")]
 
 
 def _key(function: Function, signature: Any, codegen: Any) -> tuple[Any, ...]:
