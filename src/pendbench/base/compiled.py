@@ -43,7 +43,7 @@ types: Any = numba.types
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_KERNEL_SOURCES = ("base/compiled.py", "effects/*.py", "physics/**/*.py", "solvers/**/*.py")
+_KERNEL_SOURCES = ("base/compiled.py", "base/machine_code.py", "effects/*.py", "physics/**/*.py", "solvers/**/*.py")
 
 #: Division by zero gives inf or nan, as in numpy: a test before each division would cost time and catch nothing.
 #: A product and a sum may be rounded once instead of twice.
