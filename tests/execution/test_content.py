@@ -238,8 +238,12 @@ def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypa
     monkeypatch.setattr(source, "_PACKAGE", tmp_path)
 
     def digest():
-        source.source_digest.cache_clear()
+        forget()
         return source.source_digest()
+
+    def forget():
+        source.source_digest.cache_clear()
+        source._measuring.cache_clear()
 
     before = digest()
     for name in ("report/text.py", "kinds/one/page.py", "kinds/one/page.md.j2", "commands/run.py"):
@@ -249,7 +253,7 @@ def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypa
         (tmp_path / name).write_text("changed")
         assert digest() != before, name
         before = digest()
-    source.source_digest.cache_clear()
+    forget()
 
 
 def test_the_installed_packages_are_read_once_for_all_engines_until_something_is_installed(monkeypatch, tmp_path):

@@ -29,11 +29,12 @@ def source_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def _measuring() -> set[Path]:
+@cache
+def _measuring() -> frozenset[Path]:
     """The files that decide what a result is."""
     told = {file for pattern in _TOLD for file in _PACKAGE.glob(pattern)}
     measured = {file for pattern in _MEASURED for file in _PACKAGE.glob(pattern)}
-    return set(_PACKAGE.rglob("*.py")) - told | measured
+    return frozenset(set(_PACKAGE.rglob("*.py")) - told | measured)
 
 
 @cache
