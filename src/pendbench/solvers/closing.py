@@ -47,16 +47,17 @@ _KEPT = 8
 
 
 class Chain(NamedTuple):
-    """couplings (n + 1,): 0, then the masses' inverses, 1/kg; lengths (n,) m; gravity m/s^2."""
+    """couplings (n + 1,): 0, then the masses' inverses, 1/kg; lengths (n,) and their sum, m; gravity m/s^2."""
 
     couplings: FloatArray
     lengths: FloatArray
+    length: float
     gravity: float
 
 
 def chain_of(masses: FloatArray, lengths: FloatArray, gravity: float) -> Chain:
     """A chain of masses (n,) kg on rods (n,) m."""
-    return Chain(np.concatenate([[0.0], 1.0 / masses]), lengths.copy(), float(gravity))
+    return Chain(np.concatenate([[0.0], 1.0 / masses]), lengths.copy(), float(np.cumsum(lengths)[-1]), float(gravity))
 
 
 class Room(NamedTuple):
@@ -194,7 +195,7 @@ def settle(room: Room, share: float, first: int, last: int) -> None:
     """Turn back the rods that went round more often than their guess, and leave them in `room`."""
     rows = room.rows
     for i in range(first, last):
-        turns = np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
+        turns = np.rint((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
         rows[ANGLE, i] -= TURN * turns
         if share < 1.0 and turns % 2.0 != 0.0:  # half a turn back, the mean of old and new points the other way
             rows[PULL, i] = -rows[PULL, i]
@@ -279,7 +280,7 @@ def descend(chain: Chain, room: Room, angles: FloatArray) -> None:
     misfit = _misfit(chain, rows, n)
     # No more than any pull: far from where masses would be, the misfit grows with the square of how far, pulls do not,
     # and so much added would keep the first step as small as the last.
-    added = min(misfit / chain.lengths.sum(), _write_tensions(chain, rows, n))
+    added = min(misfit / chain.length, _write_tensions(chain, rows, n))
     for _ in range(_MOST_DESCENTS):
         _write_tensions(chain, rows, n)
         for i in range(n):
@@ -296,4 +297,4 @@ def descend(chain: Chain, room: Room, angles: FloatArray) -> None:
         elif not _SMALL < worst < _FAR:
             added *= 3.0 if worst > _SMALL else 0.1
     for i in range(n):
-        rows[ANGLE, i] -= TURN * np.round((rows[ANGLE, i] - rows[GUESS, i]) / TURN)
+        rows[ANGLE, i] -= TURN * np.rint((rows[ANGLE, i] - rows[GUESS, i]) / TURN)

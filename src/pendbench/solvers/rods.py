@@ -179,7 +179,7 @@ def start(chain: Chain, state: State, dt: float) -> None:
         rows[GUESS, i] = state.v[i] - h * turning
     _write_motion(chain, memory, rows, rows[ANGLE, :n], rows[GUESS, :n], _ROD_BEFORE)
     state.steps[STEP], state.steps[STEP_BEFORE], state.steps[PART] = h, h, size
-    state.steps[OWN_SPEED] = max(_own_speed(chain, memory), _STILL * chain.lengths.sum() / abs(dt))
+    state.steps[OWN_SPEED] = max(_own_speed(chain, memory), _STILL * chain.length / abs(dt))
 
 
 @inlined
