@@ -231,7 +231,19 @@ def test_a_library_of_one_file_is_known_by_its_record(tmp_path, monkeypatch):
     assert parts("one_engine") == [b"one_engine.py,,\n"]
 
 
-def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypatch):
+@pytest.fixture
+def forget():
+    """Has the project's source looked at again, also when the test has ended."""
+
+    def clear():
+        source.source_digest.cache_clear()
+        source._measuring.cache_clear()
+
+    yield clear
+    clear()
+
+
+def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypatch, forget):
     for name in ("report/text.py", "kinds/one/page.py", "kinds/one/work.py", "commands/run.py", "physics/a.py"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("")
@@ -241,10 +253,6 @@ def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypa
         forget()
         return source.source_digest()
 
-    def forget():
-        source.source_digest.cache_clear()
-        source._measuring.cache_clear()
-
     before = digest()
     for name in ("report/text.py", "kinds/one/page.py", "kinds/one/page.md.j2", "commands/run.py"):
         (tmp_path / name).write_text("changed")
@@ -253,7 +261,6 @@ def test_pages_and_plots_are_no_part_of_the_source_of_results(tmp_path, monkeypa
         (tmp_path / name).write_text("changed")
         assert digest() != before, name
         before = digest()
-    forget()
 
 
 def test_the_installed_packages_are_read_once_for_all_engines_until_something_is_installed(monkeypatch, tmp_path):

@@ -19,11 +19,13 @@ from typing import Any, Final
 import llvmlite.binding as llvm
 from numba.core import compiler, serialize
 from numba.core.runtime.nrt import rtsys
+from numba.experimental import function_type  # noqa: F401, with it numba knows a function of C as an argument
 
 from pendbench.base.files import write_whole
 
 _RESULT: Final[Any] = compiler.CompileResult
 _NUMBA: Final[Any] = serialize
+_DIGEST_SIZE: Final = hashlib.sha256().digest_size
 _ADDRESS: Final = re.compile(r"\b0x[0-9a-fA-F]+")
 _NO_NAME: Final = re.compile(r"[^\w.]")  # as <locals>, which no file may be called on some systems
 
@@ -31,17 +33,21 @@ Function = Callable[..., Any]
 
 
 def load(folder: Path, function: Function, signature: Any, context: Any) -> Any:
-    """What `save` kept of this function for arguments of these numba types; None for nothing that can be read."""
+    """What `save` kept of this function for arguments of these numba types; None for nothing that can be used.
+
+    numba would first import its whole library, which takes half a second. But machine code needs no more of it than the
+    modules of the functions that were compiled into it, and those are imported as it is read.
+    """
     key = _key(function, signature, context.codegen())
     try:
-        kept, needed, parts = pickle.loads(_path(folder, function, key).read_bytes())
-    except Exception:  # no such file; or one that something happened to: it is written again
+        content = _path(folder, function, key).read_bytes()
+        digest, packed = content[:_DIGEST_SIZE], content[_DIGEST_SIZE:]
+        kept, needed, parts = pickle.loads(packed) if digest == _digest(packed) else (None, (), ())
+    except Exception:  # no such file, or one that speaks of what is no longer there: it is written again
         return None
-    if kept != key:
+    rtsys.initialize(context)  # so that the memory of arrays is among what can be called
+    if kept != key or any(llvm.address_of_symbol(name) is None for name in needed):
         return None
-    rtsys.initialize(context)
-    if any(llvm.address_of_symbol(name) is None for name in needed):
-        context.refresh()  # all that numba can compile, which takes half a second: few kernels need it to run
     return _RESULT._rebuild(context, *parts)
 
 
@@ -50,14 +56,23 @@ def save(folder: Path, function: Function, signature: Any, compiled: Any) -> Non
     if compiled.library.has_dynamic_globals:  # addresses of this process
         return
     key = _key(function, signature, compiled.library.codegen)
-    content = _NUMBA.dumps((key, _needed(compiled.library), compiled._reduce()))
+    packed = _NUMBA.dumps((key, _needed(compiled), compiled._reduce()))
     with suppress(OSError):
-        write_whole(_path(folder, function, key), lambda file: file.write(content), lasting=False)
+        write_whole(_path(folder, function, key), lambda file: file.write(_digest(packed) + packed), lasting=False)
 
 
-def _needed(library: Any) -> list[str]:
-    """What the machine code uses and does not have, by name: it ends the process if it is not there."""
-    module = library._final_module
+def _digest(packed: bytes) -> bytes:
+    return hashlib.sha256(packed).digest()
+
+
+def _needed(compiled: Any) -> list[str]:
+    """The names of what the machine code calls that is not in it: it would end a process that does not know them.
+
+    Kernels that call each other in a circle cannot be loaded alone: numba has a name for that which nothing ever gets.
+    """
+    if compiled.reload_init:  # it brings what it calls itself
+        return []
+    module = compiled.library._final_module
     values = (*module.functions, *module.global_variables)
     return [its.name for its in values if its.is_declaration and not its.name.startswith("llvm.")]
 
