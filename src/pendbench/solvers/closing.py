@@ -57,7 +57,8 @@ class Chain(NamedTuple):
 
 def chain_of(masses: FloatArray, lengths: FloatArray, gravity: float) -> Chain:
     """A chain of masses (n,) kg on rods (n,) m."""
-    return Chain(np.concatenate([[0.0], 1.0 / masses]), lengths.copy(), float(np.cumsum(lengths)[-1]), float(gravity))
+    length = float(np.cumsum(lengths)[-1])  # added from one end to the other, as a loop does
+    return Chain(np.concatenate([[0.0], 1.0 / masses]), lengths.copy(), length, float(gravity))
 
 
 class Room(NamedTuple):
